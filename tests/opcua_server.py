@@ -32,6 +32,7 @@ from impactcell.scada import (
     ValuePage,
 )
 from impactcell.scada.users import User, write_users
+from tests.patience import PATIENCE_S
 from tests.snapshots import make_capture, make_snapshot
 
 CELL = "press-1"
@@ -46,9 +47,7 @@ POLICIES = {
 START_NS = 1_780_000_000_000_000_000
 
 
-PATIENT_S = 300.0
-"""Nothing is judged by it: whoever is waited for works on a machine that may be busy."""
-PATIENT = {"hello_s": PATIENT_S, "activation_s": PATIENT_S}
+PATIENT = {"hello_s": PATIENCE_S, "activation_s": PATIENCE_S}
 """Limits of a server that does not close who is slow."""
 
 
@@ -56,7 +55,7 @@ class PatientClient(Client):
     """A client that gives up nobody who is slow; another asks each second whether it is answered in one."""
 
     def __init__(self, endpoint: str) -> None:
-        super().__init__(endpoint, timeout=PATIENT_S, watchdog_intervall=PATIENT_S)
+        super().__init__(endpoint, timeout=PATIENCE_S, watchdog_intervall=PATIENCE_S)
 
 
 class MemoryHistory:

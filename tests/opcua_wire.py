@@ -9,6 +9,7 @@ from asyncua import ua
 from asyncua.ua.ua_binary import struct_to_binary
 
 from tests.opcua_server import PatientClient, Site
+from tests.patience import PATIENCE_S
 
 NONE_URI = b"http://opcfoundation.org/UA/SecurityPolicy#None"
 
@@ -48,14 +49,14 @@ class Raw:
         await self.writer.drain()
 
     async def receive(self) -> tuple[bytes, bytes]:
-        head = await asyncio.wait_for(self.reader.readexactly(8), 30)
+        head = await asyncio.wait_for(self.reader.readexactly(8), PATIENCE_S)
         size = struct.unpack("<I", head[4:])[0]
         return head[:3], await self.reader.readexactly(size - 8)
 
     async def error(self) -> int:
         kind, body = await self.receive()
         assert kind == b"ERR", (kind, body)
-        assert await asyncio.wait_for(self.reader.read(), 30) == b"", "the connection was not closed"
+        assert await asyncio.wait_for(self.reader.read(), PATIENCE_S) == b"", "the connection was not closed"
         return struct.unpack("<I", body[:4])[0]
 
     async def channel(self) -> tuple[int, int]:

@@ -10,7 +10,7 @@ from impactcell.discrepancy.search import Mapper
 from impactcell.errors import DiscrepancyError, PhysicsError
 from impactcell.physics.outside_effects import offer_texts, offered_texts
 
-ANSWER_S = 10
+ANSWER_S = 30
 """Longest wait for the scheduler's answer, seconds."""
 
 

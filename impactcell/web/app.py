@@ -6,7 +6,7 @@ from typing import Final
 from urllib.parse import quote
 
 from starlette.applications import Starlette
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
@@ -114,6 +114,7 @@ def page_app(
         routes=routes,
         exception_handlers={
             RequestRefusedError: _refused(context),
+            ClientDisconnect: _left,
             404: _not_found(context),
             405: _not_found(context),
             Exception: _failed(context),
@@ -193,6 +194,11 @@ def _refused(context: PageContext) -> Callable[[Request, Exception], Awaitable[R
         return context.error_page(request, error.status, error.reason)
 
     return handle
+
+
+async def _left(request: Request, error: Exception) -> Response:  # noqa: ARG001 - as Starlette calls it
+    """Answer somebody who left in the middle of a request: nobody reads it, and it is no fault."""
+    return Response(status_code=400)
 
 
 def _not_found(context: PageContext) -> Callable[[Request, Exception], Awaitable[Response]]:

@@ -32,6 +32,17 @@ SHUTDOWN_S: Final = 1
 """How long requests may take to end when the service ends."""
 
 
+class _CutOff(logging.Filter):
+    """Says in a line that the service's end cut a request off; uvicorn takes it for a fault of the page."""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Let everything through, such a record without its traceback."""
+        if record.exc_info and isinstance(record.exc_info[1], asyncio.CancelledError):
+            record.msg, record.args, record.exc_info = "a request was cut off: the service ends", (), None
+            record.levelno, record.levelname = logging.INFO, logging.getLevelName(logging.INFO)
+        return True
+
+
 class PageServer:
     """Serves the page from a thread of its own, between `start` and `stop`.
 
@@ -110,11 +121,14 @@ class PageServer:
         self._thread.join()
 
     def _run(self) -> None:
+        uvicorns, cut_off = logging.getLogger("uvicorn.error"), _CutOff()
+        uvicorns.addFilter(cut_off)
         try:
             asyncio.run(self._serve())
         except (OSError, RuntimeError):
             _log.exception("the page has ended; cells and OPC UA go on")
         finally:
+            uvicorns.removeFilter(cut_off)
             self._listener.close()
 
     async def _serve(self) -> None:

@@ -3,9 +3,11 @@
 Each of the busy processes counts for one in the load average; the processors are shared with the workers of
 the suite. A run is green if pytest says so; what failed is printed. What comes behind `--` goes to pytest.
 
-With `--together` the runs go side by side and are each other's load (five of four workers each are a load of
-20; add `--load 0`). Each has a clone of the last commit of its own, so that runs do not meet in files, and
-the same installed packages.
+All that pytest said is kept in `--keep DIR`, a file for each run.
+
+With `--together` the runs go side by side and are each other's load (five of three workers each are a load of
+15; `--load 5` makes it 20). Each has a clone of the last commit of its own, so that runs do not meet in
+files, and the same installed packages.
 """
 
 import argparse
@@ -20,6 +22,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
 from tests.benchmarks.table import Table
@@ -49,17 +52,36 @@ def _load(busy: int) -> Iterator[None]:
             process.join()
 
 
-def run(arguments: list[str], checkout: Path = ROOT) -> tuple[int, float, float, list[str]]:
-    """Run the suite once; its exit code, how long it took in s, the load then, and what it said last."""
+@dataclass(frozen=True)
+class Run:
+    """How one run of the suite ended."""
+
+    exit_code: int
+    took_s: float
+    load: float
+    output: str
+
+    @property
+    def last_lines(self) -> list[str]:
+        """What failed, and how many of each there were."""
+        return [match[0] for match in LAST_LINES.finditer(self.output)]
+
+
+def run(arguments: list[str], log: Path, checkout: Path = ROOT) -> Run:
+    """Run the suite once; what it says goes to a file."""
     began_s = time.monotonic()
     command = [sys.executable, "-m", "pytest", *SUITE, *arguments]
-    environment = os.environ | {"PYTHONPATH": str(checkout)}
-    done = subprocess.run(command, cwd=checkout, env=environment, capture_output=True, text=True, check=False)
-    said = [match[0] for match in LAST_LINES.finditer(done.stdout)]
-    return done.returncode, time.monotonic() - began_s, os.getloadavg()[1], said
+    # a summary line is cut at the terminal's width, and the reason with it
+    environment = os.environ | {"PYTHONPATH": str(checkout), "COLUMNS": "400"}
+    with log.open("w", encoding="utf-8") as said:
+        done = subprocess.run(
+            command, cwd=checkout, env=environment, stdout=said, stderr=subprocess.STDOUT, check=False
+        )
+    took_s = time.monotonic() - began_s
+    return Run(done.returncode, took_s, os.getloadavg()[1], log.read_text(encoding="utf-8"))
 
 
-def run_in_clone(arguments: list[str]) -> tuple[int, float, float, list[str]]:
+def run_in_clone(arguments: list[str], log: Path) -> Run:
     """Run the suite once in a clone of the last commit, which goes away afterwards."""
     with tempfile.TemporaryDirectory(prefix="suite-") as directory:
         checkout = Path(directory) / "checkout"
@@ -68,7 +90,7 @@ def run_in_clone(arguments: list[str]) -> tuple[int, float, float, list[str]]:
         (checkout / ".venv").symlink_to(sys.prefix)
         for name in ("pyproject.toml", "requirements.lock"):
             shutil.copystat(ROOT / name, checkout / name)
-        return run(arguments, checkout)
+        return run(arguments, log, checkout)
 
 
 def main() -> int:
@@ -77,16 +99,23 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--load", type=int, default=20, help="busy processes beside the suite")
     parser.add_argument("--together", action="store_true", help="the runs side by side, each in a clone")
+    parser.add_argument("--keep", type=Path, help="directory for what pytest said")
     parser.add_argument("arguments", nargs="*", help="for pytest, behind `--`")
     options = parser.parse_args()
     rows = []
     one_run, at_once = (run_in_clone, options.runs) if options.together else (run, 1)
-    with _load(options.load), ThreadPoolExecutor(at_once) as runs:
-        results = list(runs.map(one_run, [options.arguments] * options.runs))
-    for number, (code, took_s, load, said) in enumerate(results, 1):
+    with tempfile.TemporaryDirectory(prefix="suite-") as directory:
+        keep = options.keep or Path(directory)
+        keep.mkdir(parents=True, exist_ok=True)
+        logs = [keep / f"run-{number}.log" for number in range(1, options.runs + 1)]
+        with _load(options.load), ThreadPoolExecutor(at_once) as runs:
+            results = list(runs.map(one_run, [options.arguments] * options.runs, logs))
+    for number, done in enumerate(results, 1):
+        said = done.last_lines
         print(f"run {number}:", *said, sep="\n  ", file=sys.stderr, flush=True)
-        green = "green" if code == 0 else f"**{code}**"
-        rows.append((f"{number}", green, f"{took_s / 60.0:.1f}", f"{load:.0f}", said[-1] if said else ""))
+        green = "green" if done.exit_code == 0 else f"**{done.exit_code}**"
+        last = said[-1] if said else ""
+        rows.append((f"{number}", green, f"{done.took_s / 60.0:.1f}", f"{done.load:.0f}", last))
     order = "side by side, each in a clone" if options.together else "one after the other"
     note = f"Runs {order}; {options.load} busy processes on {os.cpu_count()} processors; "
     note += "bar: green in each run."

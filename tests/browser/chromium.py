@@ -20,9 +20,9 @@ from selenium.common.exceptions import (
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
+from tests.patience import PATIENCE_S
+
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
-PATIENCE_S = 30.0
-"""A page that does not show what it should by then has failed."""
 DESK, PHONE, WALL = (1280, 900), (375, 812), (3840, 2160)
 """Widths and heights in pixels."""
 
@@ -46,6 +46,8 @@ def chromium(profile: Path) -> Iterator["Browser"]:
         f"user-data-dir={profile}",
     ):
         options.add_argument(f"--{flag}")
+    options.add_experimental_option("browserStartupTimeout", int(1e3 * PATIENCE_S))
+    options.timeouts = {name: int(1e3 * PATIENCE_S) for name in ("script", "pageLoad")}
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     driver = webdriver.Chrome(options, webdriver.ChromeService(str(DRIVER)))
     try:

@@ -16,14 +16,13 @@ from simulator.campaign_scenario import CampaignScenario
 from tests.browser.chromium import DESK, PHONE, Browser, need_chromium
 from tests.browser.shop import CELL, Shop, at_work, enter, judge
 from tests.integration.processes import CONFIG
+from tests.patience import COMPILING_S
 
 pytestmark = [pytest.mark.browser, pytest.mark.asyncio(loop_scope="module")]
 
 MISSING = {"stribeck_friction": {"friction_increase": 0.03, "stribeck_velocity_m_s": 0.04}}
 KNOWN = {"viscous_friction": {"viscous_coefficient_n_s_per_m": 85}}
 """What the cell's model has already."""
-STUDY_S = 240.0
-"""What is done at the lowest priority may take long on a machine that is busy with other tests."""
 HEADER = "Schuss;Zeit [ms];Kraft [N];Weg [mm];Geschwindigkeit [mm/min];Masse [kg];Richtung\n"
 
 
@@ -97,22 +96,22 @@ async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Brows
         browser.open(f"{shop.page}/studies")
         browser.find("#drop-form input[type=file]").send_keys(str(table))
         browser.find("#drop-form button").click()
-        browser.find('[data-stage="confirming"]', STUDY_S)
+        browser.find('[data-stage="confirming"]', COMPILING_S)
 
     def run() -> float:
         begun = time.monotonic()
         browser.find('button[value="discrepancy"]').click()
-        browser.find('[data-effect="stribeck_friction"]', STUDY_S)
+        browser.find('[data-effect="stribeck_friction"]', COMPILING_S)
         browser.until(
             lambda: "Missing: stribeck friction" in browser.text_within("iframe.report"), "the report"
         )
         named_s = time.monotonic() - begun
-        browser.find('[data-stage="done"]', STUDY_S)  # what accepting it would change is told last
+        browser.find('[data-stage="done"]', COMPILING_S)  # what accepting it would change is told last
         return named_s
 
     def accept() -> None:
         browser.find('form[action$="/accept"] button').click()
-        browser.find('[data-acceptance="accept"]', STUDY_S)
+        browser.find('[data-acceptance="accept"]', COMPILING_S)
 
     def closed() -> float:
         browser.open(f"{shop.page}/cells/{CELL}")
@@ -169,7 +168,7 @@ async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Brows
     def undo() -> None:
         browser.driver.back()
         browser.find('form[action$="/restore"] button').click()
-        browser.find('[data-acceptance="restore"]', STUDY_S)
+        browser.find('[data-acceptance="restore"]', COMPILING_S)
 
     await shop.beside(undo)
     model = shop.directory / "model.yaml"
@@ -187,7 +186,7 @@ async def test_what_cannot_be_read_is_said_and_a_script_in_a_name_is_text(
         browser.open(f"{shop.page}/studies")
         browser.find("#drop-form input[type=file]").send_keys(str(path))
         browser.find("#drop-form button").click()
-        browser.find(".faults li", STUDY_S)
+        browser.find(".faults li", COMPILING_S)
         assert browser.driver.title != "owned"
         return browser.all(".faults")[0].text
 

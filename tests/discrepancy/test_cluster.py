@@ -1,5 +1,6 @@
 """The workflow on a dask cluster of two worker processes gives the same result to the byte."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,18 @@ from impactcell.physics import Ensemble, TapInput
 from impactcell.physics.effects import withdraw_effect
 from impactcell.physics.outside_effects import offer_effects
 from tests.discrepancy.test_workflow import make
+from tests.patience import PATIENCE_S
 from tests.unit.physics.test_outside_effects import OWN
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Nobody is given up who is only slow."""
+    dask = pytest.importorskip("dask")
+    monkeypatch.setattr("impactcell.cli.cluster.ANSWER_S", PATIENCE_S)
+    timeouts = {f"distributed.comm.timeouts.{kind}": f"{PATIENCE_S} s" for kind in ("connect", "tcp")}
+    with dask.config.set({**timeouts, "distributed.scheduler.worker-ttl": None}):
+        yield
 
 
 @pytest.mark.long

@@ -13,7 +13,8 @@ import yaml
 
 from impactcell.process import yaml_loader
 from tests.integration.forked import forked
-from tests.integration.running import START_S, Running
+from tests.integration.running import Running
+from tests.patience import COMPILING_S
 
 ROOT = Path(__file__).resolve().parents[2]
 CONFIG = ROOT / "config"
@@ -57,7 +58,7 @@ async def simulator(
     truth = directory / "truth.jsonl"
     async with forked("simulator", "serve", str(path), "--truth", str(truth)) as running:
         assert running.output is not None
-        async with asyncio.timeout(START_S):
+        async with asyncio.timeout(COMPILING_S):
             line = await running.output.readline()
         assert line, "\n".join(running.lines)
         yield {**json.loads(line), "truth": truth, "running": running}

@@ -5,8 +5,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Protocol
 
-START_S = 400.0
-"""The first start on a machine compiles."""
+from tests.patience import COMPILING_S
 
 
 class AnyProcess(Protocol):
@@ -28,7 +27,7 @@ class Running:
     lines: list[str] = field(default_factory=list)
     news: asyncio.Condition = field(default_factory=asyncio.Condition)
 
-    async def line(self, pattern: str, timeout_s: float = START_S) -> re.Match[str]:
+    async def line(self, pattern: str, timeout_s: float = COMPILING_S) -> re.Match[str]:
         """Wait for a line of standard error."""
 
         def found() -> re.Match[str] | None:

@@ -19,6 +19,7 @@ from tests.data.contents import described, stored, without_later_conditions
 from tests.data.make_journal import CELL, CELL_FILE
 from tests.integration.processes import write_cell
 from tests.integration.watched import serving
+from tests.patience import COMPILING_S
 
 DATA = Path(__file__).parents[1] / "data"
 
@@ -86,7 +87,7 @@ async def test_a_later_state_is_left_alone_with_an_alarm_and_the_others_run(
     odd, well = write_cell(tmp_path, 1, CELL, **CELL_FILE), write_cell(tmp_path, 2, "well")
     async with serving(odd, well) as watched:
         await watched.alarm("well", "ModuleConnection", active=True)
-        async with asyncio.timeout(400):
+        async with asyncio.timeout(COMPILING_S):
             while not any(cell == CELL for cell, _ in shown):
                 await asyncio.sleep(0.02)
         assert CELL not in watched.service.running

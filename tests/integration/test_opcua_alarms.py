@@ -20,6 +20,7 @@ from impactcell.alarms import (
 )
 from impactcell.records import Alarm, Evidence
 from tests.opcua_server import CELL, Site, site
+from tests.patience import PATIENCE_S
 
 codes = ua.StatusCodes
 
@@ -34,7 +35,7 @@ class Events:
         self.queue.put_nowait(event)
 
     async def next(self) -> object:
-        return await asyncio.wait_for(self.queue.get(), 120)
+        return await asyncio.wait_for(self.queue.get(), PATIENCE_S)
 
 
 async def listening(here: Site, client: Client) -> Events:

@@ -13,6 +13,7 @@ from asyncua.ua.ua_binary import struct_to_binary
 from impactcell.scada import ServerLimits
 from tests.opcua_server import PATIENT, site
 from tests.opcua_wire import alive, frame, hello, message, open_channel, raw
+from tests.patience import PATIENCE_S
 
 codes = ua.StatusCodes
 BEFORE_HELLO = {
@@ -131,7 +132,7 @@ async def test_noise(seed: int) -> None:
                         data[rng.randrange(8, len(data))] = rng.randrange(256)
                     await wire.send(bytes(data) if rng.random() < 0.8 else rng.randbytes(rng.randrange(200)))
                     wire.writer.write_eof()
-                    await asyncio.wait_for(wire.reader.read(), 30)
+                    await asyncio.wait_for(wire.reader.read(), PATIENCE_S)
         await alive(here)
 
 

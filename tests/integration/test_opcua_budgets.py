@@ -21,6 +21,7 @@ from impactcell.scada import ServerLimits, ValuePage
 from impactcell.scada.users import Users
 from tests.opcua_server import PASSWORDS, Site, site
 from tests.opcua_wire import frame, hello, message, raw
+from tests.patience import PATIENCE_S
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 codes = ua.StatusCodes
@@ -141,7 +142,7 @@ async def test_a_connection_that_has_ended_is_freed_at_once(
             await (await here.node(client, "Module/Connected")).read_data_value(False)
         assert len(freed) >= 4
         for ended in freed:
-            await asyncio.wait_for(ended.wait(), 30.0)
+            await asyncio.wait_for(ended.wait(), PATIENCE_S)
     finally:
         gc.enable()
 
@@ -407,8 +408,8 @@ async def test_a_long_request_that_waits_lets_those_of_others_pass(
             values = [ua.ReadValueId(state, ua.AttributeIds.Value)] * (LARGE_BYTES // 16)
             task = asyncio.create_task(request_of(here, first))
             try:
-                assert await asyncio.to_thread(begun.wait, 60.0)
-                async with asyncio.timeout(60.0):
+                assert await asyncio.to_thread(begun.wait, PATIENCE_S)
+                async with asyncio.timeout(PATIENCE_S):
                     read = await second.uaclient.read(ua.ReadParameters(NodesToRead=values))
                 assert {value.StatusCode.is_good() for value in read} == {True}
                 assert not task.done()

@@ -17,6 +17,7 @@ from impactcell.opcua.trust_list import der, fingerprint
 from impactcell.scada import Role, SecurityPolicy
 from impactcell.scada.users import User, read_users, write_users
 from tests.opcua_server import CLIENT_URI, PASSWORDS, PatientClient, Site, site
+from tests.patience import PATIENCE_S
 
 codes = ua.StatusCodes
 
@@ -334,5 +335,5 @@ async def test_a_role_that_is_lowered_holds_for_sessions_that_live(here: Site) -
                 pass
             return code
 
-        assert await asyncio.wait_for(refused(), 120) == codes.BadUserAccessDenied
+        assert await asyncio.wait_for(refused(), PATIENCE_S) == codes.BadUserAccessDenied
         assert client.application_uri == CLIENT_URI

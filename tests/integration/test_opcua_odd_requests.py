@@ -7,8 +7,9 @@ from asyncua import Client, ua
 from asyncua.ua.ua_binary import struct_from_binary
 
 from tests.opcua_requests import OddRequests
-from tests.opcua_server import CELL, PATIENT_S, site
+from tests.opcua_server import CELL, site
 from tests.opcua_wire import alive
+from tests.patience import PATIENCE_S
 
 REQUESTS = 700
 """A fault in one place of one service is met by one in thousands: longer runs try more of them."""
@@ -57,7 +58,7 @@ async def _nodes_below(client: Client, root: ua.NodeId) -> list[ua.NodeId]:
 async def _answer(client: Client, odd: OddRequests, request: object) -> str:
     """Send a request; the name of the status it is answered with, the worst of its results first."""
     try:
-        data = await client.uaclient.protocol.send_request(request, timeout=PATIENT_S)
+        data = await client.uaclient.protocol.send_request(request, timeout=PATIENCE_S)
     except ua.UaStatusCodeError as error:
         return str(ua.StatusCode(error.code).name)
     answer = struct_from_binary(getattr(ua, type(request).__name__.replace("Request", "Response")), data)

@@ -11,6 +11,7 @@ from impactcell.quantities import CYCLE
 from impactcell.scada import HistoryValue, Permission, Role
 from impactcell.scada.rights import MATRIX, Area, allowed
 from tests.opcua_server import CELL, START_NS, Site, site
+from tests.patience import PATIENCE_S
 
 REFUSED = {ua.StatusCodes.BadUserAccessDenied}
 
@@ -86,7 +87,7 @@ async def write(hand: Hand) -> int:
 async def subscribe(hand: Hand) -> int:
     subscription = await hand.client.create_subscription(20, hand.events)
     await subscription.subscribe_data_change(await hand.here.node(hand.client, "Wear/Level"))
-    await asyncio.wait_for(hand.events.queue.get(), 120)
+    await asyncio.wait_for(hand.events.queue.get(), PATIENCE_S)
     await subscription.delete()
     return 0
 
@@ -102,7 +103,7 @@ async def events(hand: Hand) -> int:
     node = await hand.here.node(hand.client, "")
     await subscription.subscribe_events(node, ua.ObjectIds.ConditionType, where_clause_generation=False)
     _fresh(hand)
-    await asyncio.wait_for(hand.events.queue.get(), 120)
+    await asyncio.wait_for(hand.events.queue.get(), PATIENCE_S)
     await subscription.delete()
     return 0
 

@@ -14,7 +14,8 @@ from impactcell.errors import AccessError
 from impactcell.opcua import login_throttle
 from impactcell.scada import Role, SecurityPolicy, ServerLimits
 from impactcell.scada.users import User, read_users, verify, with_password, write_users
-from tests.opcua_server import CLIENT_URI, PASSWORDS, PATIENT, PATIENT_S, PatientClient, Site, site
+from tests.opcua_server import CLIENT_URI, PASSWORDS, PATIENT, PatientClient, Site, site
+from tests.patience import PATIENCE_S
 
 codes = ua.StatusCodes
 
@@ -101,7 +102,7 @@ async def guessing(
 
 async def in_time(work: Awaitable[int]) -> int:
     """Wait for what must not wait for a guesser's hour."""
-    return await asyncio.wait_for(work, 60)
+    return await asyncio.wait_for(work, PATIENCE_S)
 
 
 async def test_only_the_guesser_waits(slow_answers: list[str]) -> None:
@@ -171,7 +172,7 @@ async def test_users_file_is_read_without_a_restart() -> None:
                     await node.read_data_value(raise_on_bad_status=False)
 
             with pytest.raises(ua.UaStatusCodeError) as refused:
-                await asyncio.wait_for(read_for_ever(), 120)
+                await asyncio.wait_for(read_for_ever(), PATIENCE_S)
             assert refused.value.code == codes.BadSessionIdInvalid, "the session of a removed user goes on"
 
 
@@ -205,7 +206,7 @@ async def test_certificate_must_be_made_for_the_application() -> None:
 async def test_more_sessions_at_once_than_allowed() -> None:
     """A thousand scaled to forty: ten are let in, the rest is refused with the standard's code."""
     async with site(
-        limits=ServerLimits(sessions=10, connections=60, undisturbed_s=PATIENT_S, **PATIENT)
+        limits=ServerLimits(sessions=10, connections=60, undisturbed_s=PATIENCE_S, **PATIENT)
     ) as here:
         here.publish()
         async with await here.client("observer") as inside:

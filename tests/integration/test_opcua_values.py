@@ -12,6 +12,7 @@ from impactcell.alarms import NAMES
 from impactcell.quantities import CYCLE, FOLDERS, MODULE
 from impactcell.records import ModuleStatus, Quality
 from tests.opcua_server import CELL, START_NS, Site, site
+from tests.patience import PATIENCE_S
 
 codes = ua.StatusCodes
 
@@ -86,7 +87,7 @@ class Changes:
         self.queue.put_nowait(data.monitored_item.Value)
 
     async def next(self) -> ua.DataValue:
-        return await asyncio.wait_for(self.queue.get(), 120)
+        return await asyncio.wait_for(self.queue.get(), PATIENCE_S)
 
 
 async def test_the_interface_is_there_with_units_and_descriptions() -> None:

@@ -12,6 +12,7 @@ from tests.certificates import Authority
 from tests.integration.forked import forked
 from tests.integration.processes import simulator, truths, write_cell
 from tests.integration.test_probe import probed
+from tests.patience import COMPILING_S
 
 DECIMATED = {
     "force": {"rate_hz": 20_000, "noise_std": 0.4, "longest_s": 0.02},
@@ -71,7 +72,7 @@ async def test_a_cell_runs_on_a_serial_line_of_115200_baud(tmp_path: Path) -> No
         cell = write_cell(tmp_path, 502, module=reached("rtu", told, None))
         async with forked("impactcell", "run", str(cell)) as service:
             await service.line(r"cell=press-1 at (\S+)")
-            async with asyncio.timeout(400):
+            async with asyncio.timeout(COMPILING_S):
                 while len(truths(told["truth"])) < 4 or len(stored(tmp_path)) < 4:
                     await asyncio.sleep(0.1)
     assert not [line for line in service.lines if "lost" in line]

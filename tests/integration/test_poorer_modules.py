@@ -15,6 +15,7 @@ from tests.integration.forked import forked
 from tests.integration.processes import CONFIG, simulator, truths, write_cell
 from tests.integration.test_probe import probed
 from tests.integration.test_running_cell import engineer, node
+from tests.patience import COMPILING_S
 
 CYCLES = 8
 LOGGER = {
@@ -53,7 +54,7 @@ async def test_a_cell_runs_on_a_module_that_has_less(kind: str, tmp_path: Path) 
         cell = write_cell(tmp_path, told["port"], module={"register_map": register_map})
         async with forked("impactcell", "run", str(cell)) as service:
             endpoint = (await service.line(r"cell=press-1 at (\S+)"))[1]
-            async with asyncio.timeout(400):
+            async with asyncio.timeout(COMPILING_S):
                 while len(stored(tmp_path)) < CYCLES:
                     await asyncio.sleep(0.1)
             async with engineer(endpoint, "integration") as client:

@@ -9,7 +9,8 @@ import pytest
 from impactcell.errors import PositioningError
 from impactcell.journal.audit_entries import AuditEntry
 from tests.integration.processes import simulator, told, write_cell
-from tests.integration.watched import PATIENCE_S, Watched, serving
+from tests.integration.watched import Watched, serving
+from tests.patience import COMPILING_S
 
 TASKS = [
     {"target_m": 0.008, "mass_kg": 12.0},
@@ -29,7 +30,7 @@ def scenario(tasks: list[dict[str, float]]) -> dict[str, Any]:
 
 async def outcomes(truth: Path, count: int) -> list[dict[str, Any]]:
     """Wait until so many tasks have ended in the simulator."""
-    async with asyncio.timeout(PATIENCE_S):
+    async with asyncio.timeout(COMPILING_S):
         while True:
             ended = [entry for entry in told(truth) if "inside" in entry]
             if len(ended) >= count:

@@ -11,6 +11,7 @@ from impactcell.scada.users import User, with_password, write_users
 from tests.integration.forked import forked
 from tests.integration.processes import simulator, started, truths, write_cell
 from tests.opcua_server import PatientClient
+from tests.patience import COMPILING_S, PATIENCE_S
 
 CYCLES = 12
 
@@ -59,7 +60,7 @@ async def test_every_cycle_once_and_right(tmp_path: Path, users: str) -> None:
                 static = await node(client, "press-1", "Friction/StaticFriction")
                 number = await node(client, "press-1", "Friction/CycleNumber")
                 await subscription.subscribe_data_change([static, number], queuesize=100)
-                async with asyncio.timeout(400):
+                async with asyncio.timeout(COMPILING_S):
                     while not any(v.Value.Value == CYCLES for n, v in changes.values if n == number):
                         changes.news.clear()
                         await changes.news.wait()
@@ -80,6 +81,6 @@ async def test_a_module_that_is_not_there_is_said_and_the_service_ends_cleanly(t
         await service.line(r"cell=press-1 127\.0\.0\.1:1.*no connection")
         await service.line(r"cell=press-1 at (\S+)")
         service.process.terminate()
-        async with asyncio.timeout(60):
+        async with asyncio.timeout(PATIENCE_S):
             assert await service.process.wait() == 0
     assert not any("Traceback" in line for line in service.lines)

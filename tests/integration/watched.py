@@ -9,9 +9,7 @@ from pathlib import Path
 from impactcell.records import Snapshot
 from impactcell.service import Service
 from impactcell.settings import read_cells
-
-PATIENCE_S = 400.0
-"""Nothing is judged by it: a busy machine may have to compile first."""
+from tests.patience import COMPILING_S
 
 
 @dataclass
@@ -22,19 +20,19 @@ class Watched:
     snapshots: dict[str, list[Snapshot]] = field(default_factory=dict)
     news: asyncio.Condition = field(default_factory=asyncio.Condition)
 
-    async def until(self, cell: str, cycles: int, timeout_s: float = PATIENCE_S) -> list[Snapshot]:
+    async def until(self, cell: str, cycles: int, timeout_s: float = COMPILING_S) -> list[Snapshot]:
         """Wait until a cell has shown so many cycles."""
         async with asyncio.timeout(timeout_s), self.news:
             await self.news.wait_for(lambda: len(self.snapshots.get(cell, [])) >= cycles)
         return self.snapshots[cell]
 
-    async def connected(self, cell: str, timeout_s: float = PATIENCE_S) -> None:
+    async def connected(self, cell: str, timeout_s: float = COMPILING_S) -> None:
         """Wait until the module of a cell answers."""
         async with asyncio.timeout(timeout_s):
             while (task := self.service.running.get(cell)) is None or not task.status.connected:
                 await asyncio.sleep(0.02)
 
-    async def alarm(self, cell: str, name: str, *, active: bool, timeout_s: float = PATIENCE_S) -> str:
+    async def alarm(self, cell: str, name: str, *, active: bool, timeout_s: float = COMPILING_S) -> str:
         """Wait until an alarm is active, or not; its message."""
         async with asyncio.timeout(timeout_s):
             while True:

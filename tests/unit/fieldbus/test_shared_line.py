@@ -12,6 +12,7 @@ from impactcell.fieldbus.codec import BUSY, Request
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.transports.shared_line import SharedLine
+from tests.patience import PATIENCE_S
 from tests.virtual_time import run_virtually
 
 REPLY_S = 0.02
@@ -141,7 +142,7 @@ def test_what_waits_when_a_device_leaves_the_line_fails_at_once() -> None:
         await clients[0].close()
         for each in waiting:
             with pytest.raises(LinkError, match="closed"):
-                await asyncio.wait_for(each, 60.0)
+                await asyncio.wait_for(each, PATIENCE_S)
         assert (await clients[1].read(3, 1)).tolist() == [3]
         await clients[1].close()
         return loop.time() - begin_s

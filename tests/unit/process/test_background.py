@@ -10,6 +10,7 @@ import pytest
 
 from impactcell.process import background
 from impactcell.process.background import run_verb
+from tests.patience import PATIENCE_S
 
 
 @pytest.fixture
@@ -63,7 +64,7 @@ async def test_it_ends_with_all_that_it_started(program: Callable[[str], object]
     work = asyncio.create_task(
         run_verb([], 2.0 if how == "time" else 300.0, lambda step: begun.set_result(int(step)))
     )
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(PATIENCE_S):
         child = await begun
         if how == "time":
             assert (await work).exit_code is None

@@ -14,6 +14,7 @@ from impactcell.journal.store import Journal
 from impactcell.records import Alarm, Quality
 from impactcell.scada import HistoryRequest, RefusedError
 from impactcell.service.history_source import ALARMS_AT_ONCE, VALUES_AT_ONCE, JournalHistory
+from tests.patience import PATIENCE_S
 from tests.snapshots import make_capture, make_snapshot
 
 CELL, VARIABLE = "press-1", "Friction/StaticFriction"
@@ -96,7 +97,7 @@ async def test_the_process_ends_with_its_service(history: JournalHistory) -> Non
     assert process is not None
     assert process.stdin is not None
     process.stdin.close()  # as the system does it for a service that was killed
-    assert await asyncio.wait_for(process.wait(), 120.0) == 0
+    assert await asyncio.wait_for(process.wait(), PATIENCE_S) == 0
 
 
 async def test_what_has_no_past(history: JournalHistory) -> None:

@@ -21,6 +21,7 @@ from impactcell.service.operator_commands import OperatorCommands
 from impactcell.settings import CellConfig, read_cell
 from impactcell.web.interface import CellNews
 from tests.integration.processes import CONFIG
+from tests.patience import PATIENCE_S
 from tests.snapshots import make_capture, make_snapshot
 
 ALARM = "ModuleConnection"
@@ -183,7 +184,7 @@ async def test_positioning_is_shown_as_it_is_then(
         if world.taps:
             assert world.taps == [number]
             break
-    await asyncio.wait_for(cycle, 60.0)
+    await asyncio.wait_for(cycle, PATIENCE_S)
 
 
 async def test_an_answer_to_an_activation_does_not_reach_the_next(cell: CellConfig) -> None:

@@ -1,6 +1,8 @@
 """Connections that say nothing, or too slowly, or are too many: they go, the page stays for the others."""
 
 import asyncio
+import logging
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -11,6 +13,7 @@ from impactcell.scada.users import User, write_users
 from impactcell.web import connections
 from impactcell.web.interface import CellFacts, PageSettings
 from impactcell.web.server import PageServer
+from tests.patience import PATIENCE_S
 from tests.unit.web.page import CELL, NAMES, Backend
 
 Streams = tuple[asyncio.StreamReader, asyncio.StreamWriter]
@@ -36,13 +39,13 @@ async def answer(streams: Streams, request: bytes) -> bytes:
     reader, writer = streams
     writer.write(request)
     await writer.drain()
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE_S):
         return await reader.readline()
 
 
 async def ended(streams: Streams) -> None:
     """Wait until the other end has closed."""
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE_S):
         try:
             while await streams[0].read(4096):
                 pass
@@ -82,7 +85,7 @@ async def test_an_address_has_so_many_connections_and_no_more(
         assert await answer(streams, WHOLE) == b"HTTP/1.1 200 OK\r\n"
     await ended(await connect(server))
     held[0][1].close()
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE_S):
         while True:  # the server hears of the one that left in its own time
             streams = await connect(server)
             try:
@@ -94,3 +97,41 @@ async def test_an_address_has_so_many_connections_and_no_more(
                 streams[1].close()
     for streams in held[1:]:
         streams[1].close()
+
+
+async def test_who_leaves_in_the_middle_of_a_form_is_no_fault(
+    server: PageServer, caplog: pytest.LogCaptureFixture
+) -> None:
+    _, writer = await connect(server)
+    form = b"Content-Type: application/x-www-form-urlencoded\r\nContent-Length: 100\r\n\r\nuser=eva"
+    writer.write(b"POST /login HTTP/1.1\r\nHost: h\r\n" + form)
+    await writer.drain()
+    writer.close()
+    await writer.wait_closed()
+    after = await connect(server)
+    assert await answer(after, WHOLE) == b"HTTP/1.1 200 OK\r\n"
+    after[1].close()
+    await asyncio.to_thread(server.stop)  # every request has ended then
+    assert [record.message for record in caplog.records] == []
+
+
+async def test_a_request_that_the_end_cuts_off_is_no_fault(
+    server: PageServer, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caplog.set_level(logging.INFO, "uvicorn.error")
+    asked = threading.Event()
+
+    async def never(*_: object) -> None:
+        asked.set()
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr("impactcell.web.login_pages.login", never)
+    _, writer = await connect(server)
+    writer.write(WHOLE)
+    await writer.drain()
+    assert await asyncio.to_thread(asked.wait, PATIENCE_S)
+    await asyncio.to_thread(server.stop)
+    writer.close()
+    said = [record for record in caplog.records if record.name == "uvicorn.error"]
+    assert "a request was cut off: the service ends" in [record.message for record in said]
+    assert not any(record.exc_info for record in said)

@@ -15,6 +15,7 @@ from impactcell.web.cell_view import CellView
 from impactcell.web.event_stream import MAX_VIEWERS, EventStream
 from impactcell.web.interface import CellNews
 from impactcell.web.live_feed import UNSEEN_NEWS, WAITING_NEWS, LiveFeed
+from tests.patience import PATIENCE_S
 from tests.snapshots import make_capture, make_snapshot
 from tests.unit.web.page import CELL, make_page, raised
 
@@ -57,7 +58,7 @@ class Viewer:
         return [cycle for cycle in values if cycle is not None]
 
     async def until_cycle(self, number: int) -> None:
-        async with asyncio.timeout(20), self.news:
+        async with asyncio.timeout(PATIENCE_S), self.news:
             await self.news.wait_for(lambda: number in self.cycles())
 
     async def leave(self) -> None:
@@ -125,7 +126,7 @@ async def test_a_slow_viewer_misses_frames_and_never_the_last(feed: LiveFeed) ->
 async def test_a_viewer_who_takes_nothing_is_let_go(feed: LiveFeed, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(event_stream, "STALLED_S", 0.0)
     viewer = Viewer(feed, reads=1)
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE_S):
         await viewer.task
     assert feed.viewers == 0
 
@@ -136,7 +137,7 @@ async def test_the_stream_ends_with_the_session(feed: LiveFeed) -> None:
     await viewer.until_cycle(1)
     viewer.may_go_on = False
     feed.put(CellNews(CELL, cycle(2)))
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE_S):
         await viewer.task
     assert viewer.events("ended") == [{}]
     assert viewer.cycles() == [1]
@@ -147,7 +148,7 @@ async def test_the_stream_ends_with_the_service(feed: LiveFeed) -> None:
     feed.put(CellNews(CELL, cycle(1)))
     await viewer.until_cycle(1)
     feed.close()
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE_S):
         await viewer.task
     feed.put(CellNews(CELL, cycle(2)))  # late news hurt nobody
 

@@ -23,6 +23,7 @@ from impactcell.web.studies.pages import REPORT_POLICY
 from impactcell.web.studies.queue import MAX_WAITING
 from impactcell.web.studies.study import Stage, Study, StudyStore
 from impactcell.web.studies.upload import safe_name
+from tests.patience import PATIENCE_S
 from tests.unit.web.page import CELL, Page, Verbs, csrf_of, make_page
 
 RESULT = {
@@ -87,7 +88,7 @@ async def drop(
 
 
 async def until(page: Page, study: str, *stages: Stage) -> Study:
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(PATIENCE_S):
         while True:
             found = page.studies.store.find(study)
             assert found is not None
