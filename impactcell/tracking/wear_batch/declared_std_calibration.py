@@ -66,6 +66,15 @@ def calibrated_std(posterior: Samples, std: float, usual: float) -> float:
 
 
 @compiled
+def calibrated_stds(posterior: Samples, stds: Samples, usual: float) -> Samples:
+    """Give the standard deviations to go with those that a history declares, each as `calibrated_std`."""
+    calibrated = np.empty(len(stds))
+    for i, std in enumerate(stds):
+        calibrated[i] = calibrated_std(posterior, std, usual)
+    return calibrated
+
+
+@compiled
 def update(
     posterior: Samples, squared: float, std: float, last: float, usual: float, weight: float
 ) -> Samples:

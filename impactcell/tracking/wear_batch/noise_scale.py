@@ -225,7 +225,7 @@ def variances(noise: NoiseScale, stds: Samples) -> Samples:
     return (
         noise.factor
         * variance_over_differences(noise.variogram.correlation)
-        * _calibrated_variances(noise, stds)
+        * declared_std_calibration.calibrated_stds(noise.exponent_posterior, stds, noise.usual_std) ** 2
     )
 
 
@@ -235,22 +235,11 @@ def scale_change(noise: NoiseScale, since: NoiseScale, stds: Samples) -> tuple[f
     return math.exp(abs(np.mean(ratios))), math.exp(np.std(ratios))
 
 
-def _calibrated_variances(noise: NoiseScale, stds: Samples) -> Samples:
-    """Variances before the factor."""
-    return (
-        np.array(
-            [
-                declared_std_calibration.calibrated_std(noise.exponent_posterior, std, noise.usual_std)
-                for std in stds
-            ]
-        )
-        ** 2
-    )
-
-
 def refit(noise: NoiseScale, values: Samples, stds: Samples) -> NoiseScale:
     """Fit the factor to all of the first values at once: from a wrong one it takes long to come up."""
-    unscaled = _calibrated_variances(noise, stds)
+    unscaled = (
+        declared_std_calibration.calibrated_stds(noise.exponent_posterior, stds, noise.usual_std) ** 2
+    )
     squared = np.diff(values) ** 2 / (unscaled[1:] + unscaled[:-1])
     # by the median, which outliers hardly move
     start = max(float(np.median(squared)) / MEDIAN_CHI_SQUARE, SMALLEST_FACTOR)
