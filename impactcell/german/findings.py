@@ -102,7 +102,7 @@ def german_headline(result: Mapping[str, Any]) -> str:
                 said = f"{names} würde angepasste Messungen erklären, zurückgehaltene bestätigen es nicht."
             said += _outdone(result)
         case _:
-            said = f"Es fehlt: {_missing(result)}; damit fällt die Abweichung von {before} auf {after}."
+            said = f"Es fehlt: {_missing(result)}; damit fällt {_fall(result, before, after)}."
             if not result.get("remaining", {}).get("explained", True):
                 share = 100.0 * (result["remaining"].get("share") or 0.0)
                 left = (
@@ -113,6 +113,21 @@ def german_headline(result: Mapping[str, Any]) -> str:
     if law:
         said += f" Ein Gesetz, das keine Bibliothek hat, passt dazu: {law['equation']}."
     return f"{said} (Abweichungen an zurückgehaltenen Messungen; 1 ist das Rauschen der Sensoren.)"
+
+
+def _fall(result: Mapping[str, Any], before: str, after: str) -> str:
+    """Say what falls: the gap, or only the spread between shots beside traces that stay as they are."""
+    gap = result["gap"]
+    parts, closed = gap.get("parts", {}).get("held_out"), gap["held_out"].get("closed_ci95")
+    if parts and closed and closed[0] <= 0.0:
+        spreads = [parts[when]["friction_factors"] for when in ("before", "after")]
+        if None not in spreads and spreads[1] < spreads[0]:
+            first, last, stays = (f"{value:.2f}" for value in (*spreads, parts["after"]["traces"]))
+            return with_decimal_commas(
+                f"die Streuung der Reibung zwischen Messungen vom {first}-Fachen auf das {last}-Fache "
+                f"der von Wiederholungen, die Abweichung der Verläufe bleibt bei {stays}"
+            )
+    return f"die Abweichung von {before} auf {after}"
 
 
 def _outdone(result: Mapping[str, Any]) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from impactcell.discrepancy.report import figures, sentences
+from impactcell.discrepancy.search.validation import Gap, GapChange, Part
 from impactcell.german.findings import german_headline
 
 
@@ -21,10 +22,17 @@ def test_a_figure_names_the_setting_of_its_shot() -> None:
     )
 
 
+def closing(before: Gap, after: Gap, low: float) -> SimpleNamespace:
+    """What a validation says of a gap that is judged in both parts."""
+    both = tuple(Part)
+    change = GapChange(both, before, after, 0.0, low, 1.0, 0.001)
+    return SimpleNamespace(held_out=change, gap_before=before.of(both), gap_after=after.of(both))
+
+
 @pytest.mark.parametrize("ties", [(), ("quadratic_drag",)])
 def test_a_tie_and_a_name_are_told_as_what_they_are(ties: tuple[str, ...]) -> None:
     result: Any = SimpleNamespace(
-        validation=SimpleNamespace(gap_before=3.0, gap_after=1.0),
+        validation=closing(Gap(3.0, 2.0), Gap(1.0, 1.0), low=0.99),
         conclusion=SimpleNamespace(
             verdict="tied" if ties else "named",
             established=("viscous_friction",),
@@ -55,7 +63,7 @@ def test_a_tie_and_a_name_are_told_as_what_they_are(ties: tuple[str, ...]) -> No
 )
 def test_effects_are_told_in_a_row(effects: list[str], english: str, german: str) -> None:
     result: Any = SimpleNamespace(
-        validation=SimpleNamespace(gap_before=3.0, gap_after=1.0),
+        validation=closing(Gap(3.0, 2.0), Gap(1.0, 1.0), low=0.99),
         conclusion=SimpleNamespace(
             verdict="named",
             established=tuple(effects),
@@ -89,3 +97,33 @@ def test_nobody_is_asked_for_more_values_of_what_has_no_more(depends_on: tuple[s
         unexplained=SimpleNamespace(phase="free_slide", depends_on=depends_on),
     )
     assert sentences.next_step(result) == said
+
+
+def test_where_only_the_spread_between_shots_falls_no_gap_is_said_to_fall() -> None:
+    """A vibration that the library lacks leaves the traces where they are."""
+    parts = {"traces": 2.96, "friction_factors": 1.55}, {"traces": 2.96, "friction_factors": 0.98}
+    result: Any = SimpleNamespace(
+        validation=closing(Gap(2.96, 1.55), Gap(2.96, 0.98), low=-1e-9),
+        conclusion=SimpleNamespace(
+            verdict="named",
+            established=("direction_asymmetry",),
+            ties={},
+            remaining=SimpleNamespace(explained=True),
+        ),
+    )
+    said = sentences._conclusion(result)
+    assert "gap falls" not in said
+    assert "spread of the friction factors falls from 1.55 to 0.98 times that of replicates" in said
+    assert "the traces stay at 2.96 noise floors" in said
+    document: dict[str, Any] = {
+        "verdict": "named",
+        "effects": [{"effect": "direction_asymmetry"}],
+        "gap": {
+            "held_out": {"before": 2.96, "after": 2.96, "closed_ci95": [-1e-9, 1e-9]},
+            "parts": {"held_out": dict(zip(("before", "after"), parts, strict=True))},
+        },
+    }
+    auf_deutsch = german_headline(document)
+    assert "fällt die Abweichung" not in auf_deutsch
+    assert "zwischen Messungen vom 1,55-Fachen auf das 0,98-Fache der von Wiederholungen" in auf_deutsch
+    assert "bleibt bei 2,96" in auf_deutsch

@@ -193,9 +193,20 @@ def _conclusion(result: DiscrepancyResult) -> str:
     beside = ""
     if not is_tied:
         missing, beside = enumerated(groups, "and"), "with them " if len(groups) > 1 else "with it "
-    fall = f"the held-out gap falls from {proof.gap_before:.2f} to {proof.gap_after:.2f} noise floors"
-    established = f"Missing: {missing}; {beside}{fall}."
+    established = f"Missing: {missing}; {beside}{_fall(proof)}."
     return established if conclusion.remaining.explained else f"{established} {_left(conclusion.remaining)}"
+
+
+def _fall(proof: Validation) -> str:
+    """Say what falls: the gap, or only the spread between shots beside traces that stay as they are."""
+    change = proof.held_out
+    if change.low > 0.0 or not change.after.factor < change.before.factor:
+        return f"the held-out gap falls from {proof.gap_before:.2f} to {proof.gap_after:.2f} noise floors"
+    return (
+        f"the held-out spread of the friction factors falls from {change.before.factor:.2f} to "
+        f"{change.after.factor:.2f} times that of replicates, the traces stay at {change.after.trace:.2f} "
+        "noise floors"
+    )
 
 
 def _gap(proof: Validation) -> str:

@@ -237,9 +237,7 @@ def scale_change(noise: NoiseScale, since: NoiseScale, stds: Samples) -> tuple[f
 
 def refit(noise: NoiseScale, values: Samples, stds: Samples) -> NoiseScale:
     """Fit the factor to all of the first values at once: from a wrong one it takes long to come up."""
-    unscaled = (
-        declared_std_calibration.calibrated_stds(noise.exponent_posterior, stds, noise.usual_std) ** 2
-    )
+    unscaled = declared_std_calibration.calibrated_stds(noise.exponent_posterior, stds, noise.usual_std) ** 2
     squared = np.diff(values) ** 2 / (unscaled[1:] + unscaled[:-1])
     # by the median, which outliers hardly move
     start = max(float(np.median(squared)) / MEDIAN_CHI_SQUARE, SMALLEST_FACTOR)
