@@ -30,6 +30,8 @@ from tests.benchmarks.table import Table
 ROOT = Path(__file__).resolve().parents[2]
 SUITE = ("-n", "auto", "--maxprocesses", "4", "--dist", "worksteal", "-q", "-o", "timeout=3600")
 """As `make test` runs it, but that a test may take an hour before it counts as hanging."""
+INSTALLED = ("tests/interop/node/node_modules", "tests/browser/node_modules")
+"""Foreign programs that `.ci/run` installs beside the tests; without them those tests skip."""
 LAST_LINES = re.compile(r"^(FAILED|ERROR) .*|^.*\b(?:passed|failed|error)\b.* in .*$", re.MULTILINE)
 
 
@@ -88,6 +90,9 @@ def run_in_clone(arguments: list[str], log: Path) -> Run:
         subprocess.run(["git", "clone", "-q", str(ROOT), str(checkout)], check=True)
         # the README's commands are run there with what is installed here, and was after these were written
         (checkout / ".venv").symlink_to(sys.prefix)
+        for packages in INSTALLED:
+            if (ROOT / packages).is_dir():
+                (checkout / packages).symlink_to(ROOT / packages)
         for name in ("pyproject.toml", "requirements.lock"):
             shutil.copystat(ROOT / name, checkout / name)
         return run(arguments, log, checkout)
