@@ -23,6 +23,7 @@ from impactcell.scada.users import User, with_password, write_users
 from tests.benchmarks._load import CLIENT_URI, PASSWORD, PUBLISHING_MS, totals, trusted_client
 from tests.benchmarks.table import Table
 from tests.integration.processes import simulator, started, write_cell
+from tests.patience import COMPILING_S
 
 CYCLES: Final = 100_000
 RATE_HZ: Final = 20.0
@@ -31,7 +32,7 @@ SETTLED: Final = 0.1
 """Share of the cycles after which memory and handles count: by then the file has its size, all is learned."""
 POINTS: Final = 50
 """How often, in equal numbers of cycles, the service is looked at."""
-SILENT_S: Final = 30.0
+SILENT_S: Final = COMPILING_S
 """Without a new cycle for so long, no more will come, s."""
 SENSORS: Final = {
     "force": {"rate_hz": 100_000, "noise_std": 0.4, "longest_s": 0.02},
@@ -159,6 +160,9 @@ def journal_mb(directory: Path) -> float:
 def table(run: Endured, cycles: int, rate_hz: float) -> Table:
     """Table of one run."""
     settled = [moment for moment in run.moments if moment.cycles >= SETTLED * cycles]
+    if not settled:
+        shown = max(run.shown, default=0)
+        raise RuntimeError(f"the service fell silent after cycle {shown} of {cycles}; what it said is above")
     first, last = settled[0], settled[-1]
     # The last fifth against the first, by their medians: one point may fall into a thinning of the journal.
     fifth = max(1, len(settled) // 5)
