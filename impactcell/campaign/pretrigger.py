@@ -7,7 +7,7 @@ import numpy as np
 
 from impactcell.campaign import contacts
 from impactcell.campaign.contents import Campaign, Excitation
-from impactcell.records import Capture, Channel
+from impactcell.records import Capture, Channel, since_contact
 
 FEWEST_SAMPLES = 10
 """Samples of force below which no contact is looked for: a baseline and a rise want as many."""
@@ -17,9 +17,6 @@ MIN_LATE_S = 1e-3
 """Time by which it has to come late: longer than a sensor lags or a channel is skewed."""
 STATED_LATE_S = 5e-3
 """The same where samples before t = 0 say that t = 0 was meant to be the contact."""
-CONTACT_S = 1e-9
-"""Time [s] up to which a sample is taken at first contact itself, where the force jumps and has no one
-value."""
 
 
 def from_contact(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
@@ -101,7 +98,7 @@ def _without_pretrigger(shot: Capture) -> Capture:
     def kept(channel: Channel | None) -> Channel | None:
         if channel is None:
             return None
-        since = channel.time_s > CONTACT_S
+        since = since_contact(channel.time_s)
         values = channel.values[since]
         return replace(channel, time_s=channel.time_s[since], values=values) if len(values) else channel
 

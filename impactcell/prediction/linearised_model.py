@@ -23,7 +23,7 @@ from impactcell.prediction.block_averaging import (
     BlockMeans,
     average_blocks,
 )
-from impactcell.records import Capture, Samples
+from impactcell.records import Capture, Samples, since_contact
 
 MU_K, RATIO, STIFFNESS, DAMPING = range(4)
 """Places in theta."""
@@ -210,7 +210,15 @@ def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
     spans = [(time - KINK_SPAN_S, time + KINK_SPAN_S) for time in kinks]
     halt = tap.stroke_m / tap.velocity_m_s
     edges = [halt] if math.isfinite(halt) else []
-    force = average_blocks(required(features.force), FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
+    pressed = required(features.force)
+    since = since_contact(pressed.time_s)
+    pressed = replace(
+        pressed,
+        time_s=pressed.time_s[since],
+        values=pressed.values[since],
+        smooth=pressed.smooth[since],
+    )
+    force = average_blocks(pressed, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
     jumps = [event.time_s for event in motion.events if event.kind is TapEventKind.CONTACT]
     if jumps or edges:
         factors = _std_factors_at_jumps(force.time_s, jumps, 2.0 * FINE_FORCE_BLOCK_S)

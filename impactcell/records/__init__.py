@@ -5,7 +5,7 @@ from it; a `Snapshot` holds them together for one cycle and is what is published
 """
 
 from impactcell.records.alarm import Alarm, Evidence, Shelving
-from impactcell.records.capture import Capture, Channel, Samples, Summary, uniform_times
+from impactcell.records.capture import Capture, Channel, Samples, Summary, since_contact, uniform_times
 from impactcell.records.friction import (
     BatchState,
     Coefficient,
@@ -39,5 +39,6 @@ __all__ = [
     "Summary",
     "TapPredictions",
     "WearState",
+    "since_contact",
     "uniform_times",
 ]

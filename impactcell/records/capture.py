@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 Samples = NDArray[np.float64]
 
+FIRST_CONTACT_S = 1e-9
+"""Time [s] up to which a sample is taken at first contact itself: modules give times in whole ns."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Channel:
@@ -33,6 +36,15 @@ class Channel:
     noise_std: float | None = None
     full_scale: tuple[float, float] | None = None
     resolution: float | None = None
+
+
+def since_contact(time_s: Samples) -> slice:
+    """Give the samples that lie after first contact, t = 0, of ascending times.
+
+    At first contact the force jumps from 0 to b v: a sample at that very moment may show either, and a model
+    cannot be held to it.
+    """
+    return slice(int(np.searchsorted(time_s, FIRST_CONTACT_S, "right")), None)
 
 
 def uniform_times(start_s: float, rate_hz: float, count: int) -> Samples:

@@ -92,3 +92,18 @@ def test_an_onset_stays_within_its_step() -> None:
     moved = problem.step_shot_parameters(problem.initial_guess(), steps)
     np.testing.assert_array_equal(moved.onset_s, problem.onset_step_s)
     assert problem.onset_step_s == pytest.approx(1.0 / study.RATE_HZ)
+
+
+def test_force_at_first_contact_itself_is_no_gap() -> None:
+    """There it jumps from 0 to b v: shown as 0, it had been called a lag of the sensor or a ramp."""
+
+    def begun(shot: Capture) -> Capture:
+        force = shot.force
+        assert force is not None
+        since = force.time_s > 0.0
+        time_s, values = np.append(0.0, force.time_s[since]), np.append(0.0, force.values[since])
+        return replace(shot, force=replace(force, time_s=time_s, values=values))
+
+    given = campaign(JOB)
+    found = name_effects(replace(given, shots=tuple(map(begun, given.shots))), seed=JOB.seed)
+    assert found.conclusion.verdict == "no_gap"

@@ -19,7 +19,7 @@ from impactcell.discrepancy.data.prepared_shots import (
     ShotSet,
 )
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio
-from impactcell.records import Capture, Channel
+from impactcell.records import Capture, Channel, since_contact
 
 SPEED_RATIO = PlausibleRatio(
     0.05, 20.0, "the part's speed over the actuator's velocity", "position_m, time_s or velocity_mm_per_min"
@@ -56,8 +56,12 @@ class Tap(ExcitationStrategy):
     floor_is_certain = True
 
     def predicted_channels(self, capture: Capture) -> tuple[Channel | None, Channel | None, Channel | None]:
-        """All of them."""
-        return capture.force, capture.position, capture.actuator
+        """All of them; of the force what comes after first contact, where it jumps and has no one value."""
+        force = capture.force
+        if force is not None:
+            since = since_contact(force.time_s)
+            force = replace(force, time_s=force.time_s[since], values=force.values[since])
+        return force, capture.position, capture.actuator
 
     def missing_information(self, shots: Sequence[PreparedShot]) -> list[str]:
         """Channels, directions, velocities, masses and replicates that are not there."""

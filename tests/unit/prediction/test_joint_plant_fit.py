@@ -49,6 +49,22 @@ def test_the_plant_is_found_within_its_error() -> None:
     assert plant.effects == {}
 
 
+@pytest.mark.parametrize("at_contact_n", [0.0, 30.0])
+def test_a_sample_at_first_contact_itself_is_no_misfit(at_contact_n: float) -> None:
+    """There the force jumps from 0 to b v, and a logger may show either, or what lies between."""
+
+    def begun(tap: Capture) -> Capture:
+        force = tap.force
+        assert force is not None
+        values = np.append(at_contact_n, force.values)
+        return replace(tap, force=replace(force, time_s=np.append(0.0, force.time_s), values=values))
+
+    taps = campaign(1, {})
+    found, kept = (fit_plant([extract(tap) for tap in given], 9.81) for given in (map(begun, taps), taps))
+    assert found.gap == pytest.approx(kept.gap, abs=1e-3)
+    assert found.model.plant.damping_n_s_per_m == pytest.approx(kept.model.plant.damping_n_s_per_m, rel=1e-4)
+
+
 def test_a_law_that_the_model_lacks_bends_it_little_and_is_seen() -> None:
     found = fit_plant([extract(tap) for tap in campaign(2, DRAG)], 9.81)
     assert found.gap > 1.5
