@@ -13,8 +13,6 @@ from tests.integration.shell_commands import shell_commands
 
 ROOT = Path(__file__).resolve().parents[2]
 COPIED = (
-    "impactcell",
-    "simulator",
     "config",
     "tests",
     "Makefile",
@@ -54,7 +52,9 @@ def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
             shutil.copytree(source, directory / name, ignore=ignored)
         else:
             shutil.copy2(source, directory / name)  # make looks at the times
-    (directory / ".venv").symlink_to(ROOT / ".venv")
+    # The program itself is no copy: beside one, all machine code would be compiled a second time.
+    for name in ("impactcell", "simulator", ".venv"):
+        (directory / name).symlink_to(ROOT / name)
     cell = directory / "config" / "cells" / "prototype.yaml"  # another test may be at the usual port
     with cell.open("a", encoding="utf-8") as file:
         file.write("opcua:\n  endpoint: opc.tcp://127.0.0.1:0/impactcell\n")
