@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
 import impactcell  # noqa: F401  # says how many threads numpy takes, and so comes before numpy
+from tests.between_workers import share_in
 
 TESTS = Path(__file__).resolve().parent
 SHARED = TESTS.parents[1] / "shared" / "data"
@@ -97,6 +98,13 @@ def standard_nodes_once() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(InternalServer, "load_standard_address_space", standard_nodes.load)
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def results_between_workers(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Have the workers of this run, and of no other, find what one of them has computed."""
+    own = tmp_path_factory.getbasetemp()
+    share_in(own.parent if hasattr(request.config, "workerinput") else own)
 
 
 @pytest.fixture(scope="session")

@@ -53,14 +53,17 @@ def found(request: pytest.FixtureRequest) -> DiscrepancyResult:
     return investigated(request.param, shots=18)
 
 
-def pages(found: DiscrepancyResult, directory: Path) -> dict[str, str]:
+@pytest.fixture(scope="module")
+def pages(found: DiscrepancyResult, tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """Its reports by language, written once: the pictures are most of the time."""
+    directory = tmp_path_factory.mktemp("reports")
     write_reports(found, "eine Kampagne", directory)
     return {language: (directory / name).read_text(encoding="utf-8") for language, name in REPORTS.items()}
 
 
-def test_both_are_whole_and_show_the_same_numbers(found: DiscrepancyResult, tmp_path: Path) -> None:
+def test_both_are_whole_and_show_the_same_numbers(pages: dict[str, str]) -> None:
     both = {}
-    for language, text in pages(found, tmp_path).items():
+    for language, text in pages.items():
         both[language] = page = Page()
         page.feed(text)
         assert page.open == []
@@ -69,13 +72,13 @@ def test_both_are_whole_and_show_the_same_numbers(found: DiscrepancyResult, tmp_
     assert len(english.headings) == len(german.headings)
     assert english.pictures == german.pictures
     assert english.outside() == german.outside()
-    in_tables = [re.findall(r'<td class="n[^"]*">([^<]*)', text) for text in pages(found, tmp_path).values()]
+    in_tables = [re.findall(r'<td class="n[^"]*">([^<]*)', text) for text in pages.values()]
     assert [with_decimal_commas(re.sub(" to ", " bis ", cell)) for cell in in_tables[0]] == in_tables[1]
 
 
-def test_nothing_is_left_in_english(found: DiscrepancyResult, tmp_path: Path) -> None:
+def test_nothing_is_left_in_english(pages: dict[str, str]) -> None:
     told = {}
-    for language, text in pages(found, tmp_path).items():
+    for language, text in pages.items():
         reader = Told()
         reader.feed(text)
         told[language] = reader.pieces

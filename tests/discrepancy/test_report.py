@@ -61,10 +61,14 @@ class Page(HTMLParser):
             self.headings.append(data)
 
 
-def page_of(found: DiscrepancyResult, directory: Path) -> Page:
+def text_of(found: DiscrepancyResult, directory: Path) -> str:
     write_report(found, "a campaign", directory / "report.html")
+    return (directory / "report.html").read_text(encoding="utf-8")
+
+
+def read(text: str) -> Page:
     page = Page()
-    page.feed((directory / "report.html").read_text(encoding="utf-8"))
+    page.feed(text)
     assert page.open == []
     return page
 
@@ -75,12 +79,23 @@ def tied() -> DiscrepancyResult:
 
 
 @pytest.fixture(scope="module")
+def text_of_tied(tied: DiscrepancyResult, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Its page, written once: the pictures are most of the time."""
+    return text_of(tied, tmp_path_factory.mktemp("tied"))
+
+
+@pytest.fixture(scope="module")
+def context_of_tied(tied: DiscrepancyResult) -> dict[str, Any]:
+    return page_context(tied, "a campaign")
+
+
+@pytest.fixture(scope="module")
 def unknown() -> DiscrepancyResult:
     return investigated("actuator_vibration", shots=18)
 
 
-def test_the_page_is_whole_and_fetches_nothing(tied: DiscrepancyResult, tmp_path: Path) -> None:
-    page = page_of(tied, tmp_path)
+def test_the_page_is_whole_and_fetches_nothing(text_of_tied: str) -> None:
+    page = read(text_of_tied)
     assert page.headings == [*SECTIONS, "How it was computed"]
     assert page.outside() == []
     assert page.pictures == 4  # two maps, the traces, the friction factors
@@ -88,8 +103,10 @@ def test_the_page_is_whole_and_fetches_nothing(tied: DiscrepancyResult, tmp_path
     assert "weigh the part" in page.text
 
 
-def test_the_first_screen_says_what_it_means_and_what_to_do(tied: DiscrepancyResult, tmp_path: Path) -> None:
-    text = page_of(tied, tmp_path).text
+def test_the_first_screen_says_what_it_means_and_what_to_do(
+    tied: DiscrepancyResult, text_of_tied: str
+) -> None:
+    text = read(text_of_tied).text
     first_screen = text[: text.index("Where they disagree")]
     assert "A noise floor is the difference between model and measurement" in first_screen
     assert first_screen.index("A noise floor is") < first_screen.index("held-out gap in noise floors")
@@ -125,7 +142,7 @@ def test_a_tie_is_told_in_the_sentence(tied: DiscrepancyResult) -> None:
 
 
 def test_an_unknown_gap_leads_to_the_guide(unknown: DiscrepancyResult, tmp_path: Path) -> None:
-    page = page_of(unknown, tmp_path)
+    page = read(text_of(unknown, tmp_path))
     (link,) = page.outside()
     guide = urlparse(link)
     assert guide.scheme == "file"
@@ -145,18 +162,22 @@ def test_what_remains_beside_an_established_effect_is_a_sentence_of_its_own(
     assert sentence.startswith(headline(tied))
     assert f"falls from {tied.validation.gap_before:.2f} to {tied.validation.gap_after:.2f}" in sentence
     assert sentence.endswith("It leaves 40 % of the gap, in free slide.")
-    assert "in free slide with velocity" in page_of(both, tmp_path).text
+    assert "in free slide with velocity" in read(text_of(both, tmp_path)).text
 
 
-def test_an_interval_that_ends_at_a_bound_is_shown_as_one(tied: DiscrepancyResult, tmp_path: Path) -> None:
-    assert "bound of its range" not in page_of(tied, tmp_path).text
+def test_an_interval_that_ends_at_a_bound_is_shown_as_one(
+    tied: DiscrepancyResult, text_of_tied: str, tmp_path: Path
+) -> None:
+    assert "bound of its range" not in read(text_of_tied).text
     ended = replace(tied.parameters[0], at_bound=True)
-    page = page_of(replace(tied, parameters=(ended, *tied.parameters[1:])), tmp_path)
+    page = read(text_of(replace(tied, parameters=(ended, *tied.parameters[1:])), tmp_path))
     assert page.text.count("bound of its range") == 1
 
 
-def test_parameters_have_their_units_and_regions_their_place(tied: DiscrepancyResult) -> None:
-    shown = page_context(tied, "a campaign")
+def test_parameters_have_their_units_and_regions_their_place(
+    tied: DiscrepancyResult, context_of_tied: dict[str, Any]
+) -> None:
+    shown = context_of_tied
     units = {row["name"]: row["unit"] for row in shown["parameters"]}
     assert units["stiffness"] == "N/m"
     assert units["damping"] == "N s/m"
@@ -171,7 +192,7 @@ def test_parameters_have_their_units_and_regions_their_place(tied: DiscrepancyRe
     assert cells == set(tied.validation.regions)
 
 
-def test_numbers_are_told_as_one_reads_them(tied: DiscrepancyResult) -> None:
+def test_numbers_are_told_as_one_reads_them(context_of_tied: dict[str, Any]) -> None:
     assert [format_number(value) for value in (670681.4, 440.834, 0.155968, 249.9, 3.2e-6, 4e9)] == [
         "670 680",
         "440.83",
@@ -180,11 +201,10 @@ def test_numbers_are_told_as_one_reads_them(tied: DiscrepancyResult) -> None:
         "3.2e-06",
         "4e+09",
     ]
-    shown = {row["name"]: row for row in page_context(tied, "a campaign")["parameters"]}
+    shown = {row["name"]: row for row in context_of_tied["parameters"]}
     assert shown["µs/µk"]["value"] > 1.0
 
 
-def test_a_phone_scrolls_tables_and_not_the_page(tied: DiscrepancyResult, tmp_path: Path) -> None:
-    write_report(tied, "a campaign", tmp_path / "report.html")
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+def test_a_phone_scrolls_tables_and_not_the_page(text_of_tied: str) -> None:
+    page = text_of_tied
     assert page.count("<table>") == page.count('<div class="wide" tabindex="0"><table>') > 3

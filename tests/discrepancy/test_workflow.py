@@ -29,6 +29,7 @@ from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.errors import CampaignError
 from impactcell.records import Channel
 from impactcell.settings.model_file import read_model
+from tests.between_workers import computed_once
 from tests.discrepancy import study
 
 STRENGTH = 1.0
@@ -41,7 +42,8 @@ def make(*hidden: str, seed: int = 3, shots: int = 36) -> Campaign:
 @functools.cache
 def investigated(*hidden: str, shots: int = 36) -> DiscrepancyResult:
     """What comes of a campaign, once for all tests that look at it."""
-    return study.name_effects(make(*hidden, shots=shots))
+    name = "-".join(("investigated", *hidden, str(shots)))
+    return computed_once(name, lambda: study.name_effects(make(*hidden, shots=shots)))
 
 
 def answer(found: DiscrepancyResult) -> tuple[str, set[str]]:
