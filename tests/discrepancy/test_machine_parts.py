@@ -7,10 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine import finding as machine_finding
 from impactcell.discrepancy.machine import proof, simulation, uniform_records
 from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
 
 
 def test_range_of_a_gap_where_nothing_is_left_is_students() -> None:
@@ -84,3 +86,22 @@ def test_held_out_stretches_are_simulated_from_begin_to_end(monkeypatch: pytest.
         (pytest.approx(7.0), pytest.approx(9.9)),
     ]
     assert (error.rmse, error.fit_percent) == (0.0, 100.0)
+
+
+@pytest.mark.parametrize(
+    ("established", "rmse", "said"),
+    [
+        (("viscous_friction",), (8e-3, 1.3e-2), True),
+        (("viscous_friction",), (8e-3, 5e-3), False),
+        ((), (8e-3, 8e-3), False),
+    ],
+)
+def test_a_simulation_that_errs_more_with_a_named_term_is_told(
+    established: tuple[str, ...], rmse: tuple[float, float], said: bool
+) -> None:
+    base = SimpleNamespace(response=Response.POSITION, coordinate=Coordinate.TRANSLATION)
+    found: Any = SimpleNamespace(established=established, base=base)
+    errors: Any = tuple(machine_finding.OpenLoopError(error, 50.0, math.nan) for error in rmse)
+    notes = notes_of_simulation(found, errors)
+    assert len(notes) == said
+    assert all("0.013 m off with it, 0.008 without" in note for note in notes)

@@ -23,6 +23,19 @@ SPIKE_FACTOR = 8.0
 """A spike differs from the running median this many times more than 95 % of the samples do [1]."""
 MIN_SPIKE_SHARE = 0.05
 """And by at least this share of the channel's range [1]."""
+MAX_HIDDEN_SHARE = 0.25
+"""Share of the force's mean square that averaging over a test function may hide of the inertial force [1]."""
+SPANS_PER_PERIOD = 11.0
+"""Second differences over an eleventh of the period average as a test function of a quarter of it: the
+triangle's standard deviation of span/sqrt(6) is that of (1 - s²)^4, half its support over sqrt(11)."""
+MIN_SPAN = 2
+"""Least span of a second difference [samples]: of one it is noise as a rule."""
+FINEST = 16
+"""Steps of sqrt(2) by which averaging is shortened at most: to a 256th [1]."""
+LEVELLED = 1.02
+"""Growth in such a step below which all of the acceleration is resolved [1]."""
+MAX_NOISE_SHARE = 0.1
+"""Share of the sensor's noise in the mean square of an acceleration beyond which it says nothing [1]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,7 +80,7 @@ class MotionScale:
     Attributes
     ----------
     period_s : float
-        2 pi std(q) / std(q').
+        2 pi std(q) / std(q'), or less where accelerations are much shorter (`resolving_period`).
     speed, load : float
         Largest speed and load.
     low, high : float
@@ -176,12 +189,57 @@ def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: 
     force = np.concatenate([record.force for record in records])
     load = np.abs(carried_force(response, force, gravity * np.sin(position)))
     return MotionScale(
-        period,
+        resolving_period(moving, period),
         float(np.quantile(np.abs(speed), LARGEST)),
         float(np.quantile(load, LARGEST)),
         float(position.min()),
         float(position.max()),
     )
+
+
+def resolving_period(records: Sequence[UniformRecord], period_s: float) -> float:
+    """Give the longest period, at most `period_s`, whose test functions still show the accelerations.
+
+    An axis that is ramped up within a tenth of a second and then runs for seconds has a period of seconds:
+    averaged over a quarter of it, the ramps are gone, and with them what tells inertia from friction. The
+    averaging is shortened until it hides at most `MAX_HIDDEN_SHARE` of the mean square of the force, inertia
+    times acceleration over ever shorter spans.
+    """
+    sizes: list[float] = []
+    for place in range(FINEST + 1):
+        size = _inertial_force(records, period_s / math.sqrt(2.0) ** place)
+        if size is None:
+            break
+        sizes.append(size)
+        if place and size < LEVELLED * sizes[-2]:
+            break
+    if not sizes:
+        return period_s
+    whole = max(sizes)
+    force = np.concatenate([record.force - record.force.mean() for record in records])
+    hidden = whole - MAX_HIDDEN_SHARE * max(whole, float(np.mean(force**2)))
+    return period_s / math.sqrt(2.0) ** next(place for place, size in enumerate(sizes) if size >= hidden)
+
+
+def _inertial_force(records: Sequence[UniformRecord], period_s: float) -> float | None:
+    """Mean square of inertia times acceleration, averaged as over a test function; None where it is noise."""
+    total, noise, count = 0.0, 0.0, 0
+    for record in records:
+        span = round(period_s / SPANS_PER_PERIOD / record.step_s)
+        if span < MIN_SPAN:
+            return None
+        if 4 * span > len(record.position):
+            continue
+        second = (
+            record.position[2 * span :] - 2.0 * record.position[span:-span] + record.position[: -2 * span]
+        )
+        scale = (record.inertia / (span * record.step_s) ** 2) ** 2
+        total += scale * float(second @ second)
+        noise += scale * 6.0 * len(second) * record.noise[0] ** 2  # variance of x - 2 y + z
+        count += len(second)
+    if not count or noise > MAX_NOISE_SHARE * total:
+        return None
+    return (total - noise) / count
 
 
 def carried_force(response: Response, force: Samples, gravity_torque: Samples) -> Samples:

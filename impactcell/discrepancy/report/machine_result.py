@@ -18,6 +18,7 @@ from impactcell.discrepancy.machine import (
     term_of,
 )
 from impactcell.discrepancy.report.result import FORMAT, SPLINE_ONLY, experiments, round_digits
+from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
 from impactcell.german.findings import enumerated
 
 SYMBOLS = {
@@ -137,7 +138,7 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
             "training": len(finding.training),
             "held_out": len(finding.held_out),
         },
-        "notes": list(finding.notes),
+        "notes": [*finding.notes, *notes_of_simulation(finding, errors)],
         "seed": finding.seed,
         "model": "model.extended.yaml",
         "report": "report.html",
