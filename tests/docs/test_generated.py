@@ -11,6 +11,7 @@ import pytest
 
 from impactcell.alarms import RULES
 from impactcell.settings import schema
+from tests.between_workers import computed_once
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -21,7 +22,7 @@ def pages() -> Iterator[dict[str, str]]:
         patch.syspath_prepend(str(ROOT / "docs"))
         from generators import PAGES
 
-        yield {name: make() for name, make in PAGES.items()}
+        yield computed_once("generated-pages", lambda: {name: make() for name, make in PAGES.items()})
 
 
 def test_every_room_is_drawn_once_and_below_what_imports_it(pages: dict[str, str]) -> None:
