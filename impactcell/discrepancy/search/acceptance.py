@@ -3,7 +3,7 @@
 Lists of candidate fits that are given here are not empty, and the likeliest out of shot is the first.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from impactcell.discrepancy.model import Fit, Problem
@@ -90,7 +90,7 @@ def exchanged(selection: SelectionResult) -> list[SelectionResult]:
     for effect, rivals in selection.ties.items():
         for rival in rivals:
             added = tuple(rival if name == effect else name for name in selection.added)
-            fit = _fit_with(selection, added)
+            fit = fitted_with(selection, added)
             if fit is None:
                 continue
             others = tuple(name for name in (effect, *rivals) if name != rival)
@@ -103,8 +103,8 @@ def exchanged(selection: SelectionResult) -> list[SelectionResult]:
     return variants
 
 
-def _fit_with(selection: SelectionResult, added: tuple[str, ...]) -> Fit | None:
-    """Fit that the search made of the nominal model with some effects."""
+def fitted_with(selection: SelectionResult, added: Iterable[str]) -> Fit | None:
+    """Fit that the search made of the nominal model with some effects; None where it made none."""
     wanted = {*selection.nominal.fit.effects, *added}
     fits = (alternative.fit for alternative in selection.alternatives)
     return next((fit for fit in fits if set(fit.effects) == wanted), None)

@@ -12,7 +12,13 @@ from dataclasses import replace
 from functools import partial
 
 from impactcell.discrepancy.model import Fit
-from impactcell.discrepancy.search.acceptance import SelectionResult, accept_plausible, accept_set, reject
+from impactcell.discrepancy.search.acceptance import (
+    SelectionResult,
+    accept_plausible,
+    accept_set,
+    fitted_with,
+    reject,
+)
 from impactcell.discrepancy.search.between_shots import accept_between_shots
 from impactcell.discrepancy.search.candidate_fits import fit_alike, fit_all_samples, without_each_effect
 from impactcell.discrepancy.search.confirmation import NestedModels
@@ -72,7 +78,10 @@ def only_test(context: SearchContext, nominal: Fit) -> SelectionResult:
 
 
 def nested_models(context: SearchContext, selection: SelectionResult) -> NestedModels:
-    """Models with all effects that were added, and with some, fitted from where a larger one stands."""
+    """Models with all effects that were added, and with some: as the search has them, else fitted.
+
+    What it has not fitted starts from where a larger one stands.
+    """
     nominal = selection.nominal.fit
     if selection.accepted is None or not selection.added:
         return NestedModels({frozenset(): nominal})
@@ -80,13 +89,19 @@ def nested_models(context: SearchContext, selection: SelectionResult) -> NestedM
     layer = [selection.accepted]
     for _ in selection.added[1:]:
         starts = {
-            frozenset(start.effects): start
-            for model in layer
-            for start in without_each_effect(nominal, model)
+            _beside(nominal, start): start for model in layer for start in without_each_effect(nominal, model)
         }
-        layer = fit_all_samples(context, [*starts.values()])
-        models |= {frozenset(model.effects[len(nominal.effects) :]): model for model in layer}
+        known = [fit for fit in (fitted_with(selection, names) for names in starts) if fit is not None]
+        names_known = {_beside(nominal, fit) for fit in known}
+        missing = [start for names, start in starts.items() if names not in names_known]
+        layer = [*known, *fit_all_samples(context, missing)]
+        models |= {_beside(nominal, model): model for model in layer}
     return NestedModels(models | {frozenset(): nominal}, selection.added)
+
+
+def _beside(nominal: Fit, model: Fit) -> frozenset[str]:
+    """Effects that a model has beside the nominal ones."""
+    return frozenset(model.effects) - frozenset(nominal.effects)
 
 
 def test_nominal(context: SearchContext, state: SearchState) -> SearchState:

@@ -4,12 +4,13 @@ import enum
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
-from impactcell.discrepancy.data import CHANNELS, PHASES, NoiseFloor, ReplicateSpread
+from impactcell.discrepancy.data import CHANNELS, PHASES, IndexArray, NoiseFloor, ReplicateSpread
 from impactcell.discrepancy.model import Fit, Problem, sample_phases, trajectory_of
 from impactcell.records import Samples
 
@@ -30,6 +31,10 @@ MAX_EXPECTED_GAP = 1.3
 """No scatter between shots makes a gap of traces beyond this one to be expected."""
 SHOWN, DECIDING = 0.95, 0.99
 """Probability of the range of gaps that is shown, and of the one by which a model is at its floor."""
+
+
+Share = TypeVar("Share", float, Samples)
+"""One share, or one a draw."""
 
 
 class Part(enum.StrEnum):
@@ -121,7 +126,7 @@ class GapMeasure:
         if gaps[0].of(parts) > MIN_OPEN_GAP:
             closed = _closed_share(gaps[0].of(parts), gaps[1].of(parts))
             draws = self._resampled_shares(before, after, parts)
-            if draws:
+            if draws.size:
                 low, high = (float(x) for x in np.quantile(draws, [0.025, 0.975]))
                 low, high = min(low, closed), max(high, closed)
         p_value = self._p_value(before, after, parts)
@@ -186,20 +191,24 @@ class GapMeasure:
         factor = math.sqrt(float(np.mean(log_factor**2))) / spread if spread > 0.0 else math.nan
         return Gap(trace, factor)
 
-    def _resampled_shares(self, before: Fit, after: Fit, parts: Sequence[Part]) -> list[float]:
+    def _resampled_shares(self, before: Fit, after: Fit, parts: Sequence[Part]) -> Samples:
         """Share closed in shots drawn with replacement; draws without a gap are left out."""
         rng = np.random.default_rng([self.seed, BOOTSTRAP])
-        counted = [(*self._counted(model), model.shot_parameters.log_factor) for model in (before, after)]
-        shares = []
-        for _ in range(RESAMPLES):
-            drawn = rng.integers(0, self.problem.count, self.problem.count)
-            gaps = [
-                self._gap(misfit[drawn], freedom[drawn], factor[drawn]).of(parts)
-                for misfit, freedom, factor in counted
-            ]
-            if gaps[0] > MIN_OPEN_GAP:
-                shares.append(_closed_share(*gaps))
-        return shares
+        drawn = rng.integers(0, self.problem.count, (RESAMPLES, self.problem.count))
+        gaps = [self._resampled_gaps(model, drawn, parts) for model in (before, after)]
+        is_open = gaps[0] > MIN_OPEN_GAP
+        return _closed_share(gaps[0][is_open], gaps[1][is_open])
+
+    def _resampled_gaps(self, model: Fit, drawn: IndexArray, parts: Sequence[Part]) -> Samples:
+        """Gap in some of its parts, shape (draws,), of the shots `drawn`, shape (draws, n)."""
+        misfit, freedom = self._counted(model)
+        spread = self.replicates.spread
+        gaps = []
+        if Part.TRACES in parts:
+            gaps.append(np.sqrt(misfit[drawn].sum(1) / np.maximum(freedom[drawn].sum(1), 1.0)))
+        if Part.FACTORS in parts and spread > 0.0:
+            gaps.append(np.sqrt((model.shot_parameters.log_factor**2)[drawn].mean(1)) / spread)
+        return np.max(gaps, axis=0) if gaps else np.full(len(drawn), np.nan)
 
     def _p_value(self, before: Fit, after: Fit, parts: Sequence[Part]) -> float:
         """Test that shots are as likely to be followed worse as better, signs at random."""
@@ -268,6 +277,6 @@ def counted_parts(
     return (Part.TRACES, Part.FACTORS) if is_wide or Part.FACTORS in acting else (Part.TRACES,)
 
 
-def _closed_share(before: float, after: float) -> float:
+def _closed_share(before: Share, after: Share) -> Share:
     """Share of what was above the noise floor, 1, that is gone."""
     return (before - after) / (before - 1.0)
