@@ -7,10 +7,11 @@ from typing import Final
 import numpy as np
 
 from impactcell.api.friction import with_masses
-from impactcell.campaign import Campaign, Excitation, from_contact
+from impactcell.campaign import Campaign, Excitation, begun_before_contact, from_contact
 from impactcell.errors import CampaignError
 from impactcell.features import Features, extract
-from impactcell.prediction.joint_plant_fit import PlantFit, fit_plant
+from impactcell.prediction.contact_onset import fit_plant_and_onset
+from impactcell.prediction.plant_fit import PlantFit
 from impactcell.process.console import print_note
 
 TAPS: Final = 30
@@ -70,7 +71,9 @@ def fit_first_model(campaign: Campaign, name: str, source: str) -> FirstModel:
     for note in notes:
         print_note(note)
     taps = with_masses([extract(shot) for shot in struck.shots])
-    fit = fit_plant(_with_one_contact(taps), struck.gravity_m_s2, name)
+    fit, _, _ = fit_plant_and_onset(
+        _with_one_contact(taps), struck.gravity_m_s2, begun_before_contact(campaign, struck), name
+    )
     provenance = {"made by": "impactcell", "fitted to": f"{len(fit.used)} taps of {source}"}
     fit = replace(fit, model=replace(fit.model, provenance=provenance))
     return FirstModel(

@@ -104,7 +104,7 @@ def estimate(
 
         return estimate_from_features(features, read_model(Path(model)))
     fit = fit_plant([features], GRAVITY_M_S2)
-    return estimate_from_features(features, calibrated(fit.model, [capture]), fit.gap)
+    return fit.estimate(features, calibrated(fit.model, [capture]))
 
 
 def _channel(time_s: Samples, values: Samples) -> Channel:

@@ -42,6 +42,15 @@ def from_contact(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     return replace(campaign, shots=kept), tuple(notes)
 
 
+def begun_before_contact(recorded: Campaign, counted: Campaign) -> frozenset[int]:
+    """Give the numbers of the shots that began before contact, of a campaign and what `from_contact` makes.
+
+    Their contact is known to a sampling step only.
+    """
+    pairs = zip(recorded.shots, counted.shots, strict=True)
+    return frozenset(after.cycle for before, after in pairs if before is not after)
+
+
 def _late_onset(force: Channel | None) -> int | None:
     """Sample at which contact begins; None where it is the first, or there is none to see."""
     if force is None or len(force.values) < FEWEST_SAMPLES or np.ptp(force.values) == 0.0:

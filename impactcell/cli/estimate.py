@@ -5,19 +5,20 @@ import io
 import json
 import math
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Set as AbstractSet
 from pathlib import Path
 from typing import TextIO
 
 from impactcell.api.friction import calibrated, with_masses
-from impactcell.campaign import Campaign, Excitation, from_contact, naming, read
+from impactcell.campaign import Campaign, Excitation, begun_before_contact, from_contact, naming, read
 from impactcell.cli.paths import check_output
 from impactcell.discrepancy.data import check_campaign_units
 from impactcell.errors import CampaignError, PredictionError
 from impactcell.features import Features, extract
 from impactcell.prediction import Model, estimate_from_features
+from impactcell.prediction.contact_onset import fit_plant_and_onset
 from impactcell.prediction.free_slide_friction import free_slide_friction
-from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.process.console import print_note, print_result
 from impactcell.process.progress import progress
 from impactcell.process.whole_files import write_whole
@@ -59,7 +60,8 @@ def estimate(
     """
     if output is not None:
         check_output(output, CampaignError)
-    campaign_data, notes = from_contact(read(campaign))
+    recorded = read(campaign)
+    campaign_data, notes = from_contact(recorded)
     for note in notes:
         print_note(note)
     if campaign_data.excitation is Excitation.DRIVEN:
@@ -76,13 +78,7 @@ def estimate(
         ]
     else:
         taps = with_masses([extract(shot) for shot in campaign_data.shots])
-        plant, misfit = _model(campaign_data, taps, cell)
-        model = calibrated(plant, [tap.capture for tap in taps])
-        with progress("estimating", len(taps)) as advance:
-            rows = []
-            for tap in taps:
-                rows.append((tap.capture.cycle, estimate_from_features(tap, model, misfit)))
-                advance()
+        rows = _of_taps(campaign_data, taps, cell, begun_before_contact(recorded, campaign_data))
     if as_json:
         sys.stdout.write(_as_json(rows))
     elif output is None:
@@ -102,19 +98,35 @@ def estimate(
         print_result(f"{len(rows)} shots in {output}")
 
 
-def _model(campaign: Campaign, taps: Sequence[Features], cell: Path | None) -> tuple[Model, float]:
-    """Give the cell's model, or one fitted to the campaign with what it leaves unexplained."""
+def _of_taps(
+    campaign: Campaign, taps: Sequence[Features], cell: Path | None, begun_before: AbstractSet[int]
+) -> list[tuple[int, FrictionEstimate]]:
+    """Estimate every tap, by the cell's model or by one that is fitted to the campaign.
+
+    Contact of the shots that begun before it is known to a sampling step only.
+    """
+    estimate_of: Callable[[Features, Model], FrictionEstimate] = estimate_from_features
     if cell is not None:
         from impactcell.settings import read_cell
 
-        return read_cell(cell).model, 1.0
-    with progress("fitting the plant", 1):
-        fitted = fit_plant(taps, campaign.gravity_m_s2)
-    print_note(
-        f"plant fitted to {len(fitted.used)} of {len(taps)} shots: {fitted.sentence}; "
-        f"residuals {fitted.gap:.3g} times the noise"
-    )
-    return fitted.model, fitted.gap
+        plant = read_cell(cell).model
+    else:
+        with progress("fitting the plant", 1):
+            fitted, taps, onset_s = fit_plant_and_onset(taps, campaign.gravity_m_s2, begun_before)
+        plant, estimate_of = fitted.model, fitted.estimate
+        if onset_s:
+            print_note(f"contact of {len(begun_before)} shots was {1e6 * onset_s:+.3g} µs off, within a step")
+        print_note(
+            f"plant fitted to {len(fitted.used)} of {len(taps)} shots: {fitted.sentence}; "
+            f"residuals {fitted.gap:.3g} times the noise"
+        )
+    model = calibrated(plant, [tap.capture for tap in taps])
+    rows = []
+    with progress("estimating", len(taps)) as advance:
+        for tap in taps:
+            rows.append((tap.capture.cycle, estimate_of(tap, model)))
+            advance()
+    return rows
 
 
 def _of_free_slide(shot: Capture, gravity_m_s2: float) -> FrictionEstimate:

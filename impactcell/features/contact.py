@@ -6,6 +6,8 @@ polynomial fitted to the samples around it, over the widest window in which the 
 
 import math
 
+import numpy as np
+
 from impactcell.errors import CaptureError, ClippedForceError, NoSeparationError
 from impactcell.features.channels import CheckedForce, smoothing_width
 from impactcell.features.measured import MeasuredFeature
@@ -27,6 +29,12 @@ THRESHOLD_STD, THRESHOLD_SHARE = 7.0, 0.005
 """Smoothed force above which there is contact: the larger of so many of its standard deviations, which noise
 reaches once in 1e12, and of this share of its largest value. A compromise: at 5 the error of the separation
 is larger by 9 %, at 10 by 16 %."""
+IDLE_PART = 10
+"""The force's last one in so many samples show what it is without contact: long after most of them."""
+IDLE_FACTOR, MAX_IDLE_SHARE = 1.5, 0.05
+"""Factor of the largest force without contact, of hum, drift or an offset, that a contact has to pass: a
+tenth of a record of 60 ms sees 0.8 of the amplitude of 50 Hz at least. Above this share of the largest force
+the part is taken to lean on the actuator."""
 PRESSED_STD = 3.0
 """Least force of a sample that is used of the falling flank, in standard deviations of a sample."""
 FLANK_S = 1.5e-3
@@ -87,6 +95,10 @@ def loss_of_contact(force: CheckedForce) -> MeasuredFeature:
         raise CaptureError(f"no contact: the force stays below {highest:.3g} N, noise is {sigma:.3g} N")
     width = smoothing_width(force)
     threshold = max(THRESHOLD_STD * sigma / math.sqrt(width), THRESHOLD_SHARE * highest)
+    idle = float(np.abs(smooth[-max(len(smooth) // IDLE_PART, 1) :]).max())
+    unsure = sigma
+    if threshold < idle < MAX_IDLE_SHARE * highest:
+        threshold, unsure = IDLE_FACTOR * idle, sigma + idle
     last = len(smooth) - 1 - int((smooth[::-1] > threshold).argmax())
     if last >= len(smooth) - max(2, width):
         raise NoSeparationError(f"the force was still {smooth[-1]:.3g} N when its record ended")
@@ -106,7 +118,7 @@ def loss_of_contact(force: CheckedForce) -> MeasuredFeature:
         if real and squares / sigma**2 < freedom + 4.0 * math.sqrt(2.0 * freedom):
             root = min(real, key=abs)
             slope = abs(float(parabola[1] + 2.0 * parabola[2] * root))
-            error = sigma * value_std(factor, root)
+            error = unsure * value_std(factor, root)
             return MeasuredFeature(end_s + window * root, window * min(error / max(slope, 1e-300), 1.0))
         window /= FLANK_SHRINK
     near = times[max(0, last - 50) : last + 2]

@@ -46,12 +46,16 @@ class SlideFeatures:
         Times of the last loss of contact and of rest.
     deceleration : MeasuredFeature
         Mean deceleration of the slide, m/s².
+    bend : float
+        How far the deceleration at either end of the slide is from its mean, m/s²: 0 but for noise where
+        friction is the same all along.
     """
 
     distance: MeasuredFeature
     separation_s: float
     stop_s: float
     deceleration: MeasuredFeature
+    bend: float
 
 
 def extract_slide(path: CheckedChannel, separation: MeasuredFeature) -> SlideFeatures:
@@ -74,16 +78,17 @@ def extract_slide(path: CheckedChannel, separation: MeasuredFeature) -> SlideFea
     if separation_s >= times[-rest_samples(len(moved))]:
         raise NoSeparationError("contact was lost only when the position record ended")
     start = _value_at_separation(times, moved, separation_s, sigma)
-    rest, stop_s, deceleration = _rest_and_deceleration(times, moved, separation_s, sigma)
+    rest, stop_s, deceleration, bend = _rest_and_deceleration(times, moved, separation_s, sigma)
     speed = max(deceleration.value, 0.0) * (stop_s - separation_s)
     error = math.hypot(rest.std, start.std, speed * separation.std)
-    return SlideFeatures(MeasuredFeature(rest.value - start.value, error), separation_s, stop_s, deceleration)
+    distance = MeasuredFeature(rest.value - start.value, error)
+    return SlideFeatures(distance, separation_s, stop_s, deceleration, bend)
 
 
 def _rest_and_deceleration(
     times: Samples, moved: Samples, separation_s: float, sigma: float
-) -> tuple[MeasuredFeature, float, MeasuredFeature]:
-    """Level at rest, time of rest, mean deceleration; a parabola through the slide tells when it stopped."""
+) -> tuple[MeasuredFeature, float, MeasuredFeature, float]:
+    """Level at rest, time of rest, mean deceleration and its bend, from polynomials through the slide."""
     final = median(moved[-rest_samples(len(moved)) :])
     first = int(times.searchsorted(separation_s, "right"))
     sliding = final - moved[first:] > MOVING_STD * sigma
@@ -121,7 +126,7 @@ def _rest_and_deceleration(
     deceleration = MeasuredFeature(
         -2.0 * float(parabola[2]) / span**2, 2.0 * sigma / float(factor[2, 2]) / span**2
     )
-    return rest, float(stop_s), deceleration
+    return rest, float(stop_s), deceleration, 3.0 * abs(c3) / span**2
 
 
 def _complex_roots(c0: float, c1: float, c2: float) -> tuple[complex, ...]:

@@ -33,9 +33,9 @@ from impactcell.prediction.phase_reweighting import (
     interval_of_blocks,
     std_factors,
 )
+from impactcell.prediction.plant_fit import PlantFit
 from impactcell.prediction.waveform import fit
 from impactcell.records import Samples
-from impactcell.records.uncertainty import plus_minus
 
 SHARED = slice(RATIO, DAMPING + 1)
 """Parameters that all taps share: mu_k/mu_s, k and b."""
@@ -60,34 +60,6 @@ NO_REST = (
 """What is said where the steps of a joint fit come to no end."""
 REWEIGHTING_ROUNDS = 4
 """Rounds of weighing the phases by what the model misses of them. Our choice."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PlantFit:
-    """Outcome of a joint fit.
-
-    Attributes
-    ----------
-    model : Model
-        Nominal plant and priors, without predictors.
-    used : tuple of int
-        Cycle numbers of the taps that the fit could use.
-    gap : float
-        RMS of all residuals in blocks, 1 = noise.
-    """
-
-    model: Model
-    used: tuple[int, ...]
-    gap: float
-
-    @property
-    def sentence(self) -> str:
-        """The parameters with what is told of their standard deviations."""
-        plant, prior = self.model.plant, self.model.prior
-        stiffness = plus_minus(plant.stiffness_n_per_m, prior.stiffness_std_n_per_m, ".6g", ".2g")
-        damping = plus_minus(plant.damping_n_s_per_m, prior.damping_std_n_s_per_m, ".5g", ".2g")
-        ratio = plus_minus(self.model.ratio, prior.ratio_std, ".4f", ".2g")
-        return f"k {stiffness} N/m, b {damping} N s/m, mu_k/mu_s {ratio} (± is 95 %)"
 
 
 def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted") -> PlantFit:
@@ -148,7 +120,7 @@ def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted
     model = Model(name, plant, prior)
     scatter = ratio_scatter(usable, model)
     model = replace(model, prior=replace(prior, ratio_std=math.hypot(prior.ratio_std, scatter)))
-    return PlantFit(model, tuple(tap.capture.cycle for tap in usable), misfit)
+    return PlantFit(model, tuple(tap.capture.cycle for tap in usable), misfit, float(stds[0]))
 
 
 def contact_constants(tap: Features) -> tuple[float, float]:
@@ -260,7 +232,7 @@ class _CampaignProblem:
         for tap in start.taps:
             h, cross, g = float(tap.normal[MU_K, MU_K]), tap.normal[SHARED, MU_K], float(tap.slope[MU_K])
             if not h > 0.0:
-                raise NotConvergedError("the friction of a tap does not show in its samples")
+                raise NotConvergedError(NO_REST)  # the friction of a tap does not show in its samples
             curvature += tap.normal[SHARED, SHARED] - np.outer(cross, cross) / h
             gradient += tap.slope[SHARED] - cross * (g / h)
             eliminated.append((h, cross, g))

@@ -8,6 +8,7 @@ import pytest
 
 import impactcell
 from impactcell.errors import CaptureError, PhysicsError, PredictionError, SettingsError
+from impactcell.features import white_noise_std
 from impactcell.physics import Plant
 from impactcell.records import Quality
 from simulator import plant as simulated
@@ -81,7 +82,8 @@ def test_friction_is_found_from_noisy_arrays() -> None:
     assert friction.mu_k.value == pytest.approx(0.16, abs=3.0 * friction.mu_k.std)
     assert friction.mu_s.value == pytest.approx(0.21, abs=3.0 * friction.mu_s.std)
     assert friction.mu_k.std < 1e-3
-    assert friction.gap == pytest.approx(1.0, abs=0.1)
+    # Over the noise that the traces show, which is 11 % low here, of some 200 samples of either channel.
+    assert friction.gap == pytest.approx(0.4 / white_noise_std(force), rel=0.05)
 
 
 def test_a_models_predictors_are_used(pytestconfig: pytest.Config) -> None:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from impactcell.errors import PredictionError
-from impactcell.features import extract
+from impactcell.features import extract, required
 from impactcell.physics import Plant
 from impactcell.prediction import Model, Prior, printed_predictor
+from impactcell.prediction.contact_onset import fit_plant_and_onset
 from impactcell.prediction.joint_plant_fit import contact_constants, estimate_mass, fit_plant, ratio_scatter
 from impactcell.records import Capture
 from tests.taps import Tap
@@ -47,6 +48,44 @@ def test_the_plant_is_found_within_its_error() -> None:
     assert abs(found.model.ratio - 0.8) < 4.0 * prior.ratio_std
     assert prior.stiffness_std_n_per_m < 1e-3 * plant.stiffness_n_per_m
     assert plant.effects == {}
+
+
+def test_contact_between_two_samples_is_found() -> None:
+    """Taps that a recorder with a trigger of its own puts half a step late had no plant, or a wrong one."""
+
+    def late(tap: Capture) -> Capture:
+        force, position = tap.force, tap.position
+        assert force is not None
+        assert position is not None
+        return replace(
+            tap,
+            force=replace(force, time_s=force.time_s + 4e-5),
+            position=replace(position, time_s=position.time_s + 4e-5),
+        )
+
+    taps = campaign(5, {})[::2]
+    begun_before = frozenset(tap.cycle for tap in taps)
+    given = [extract(late(tap)) for tap in taps]
+    found, counted, onset_s = fit_plant_and_onset(given, 9.81, begun_before)
+    assert onset_s == pytest.approx(4e-5, abs=2e-6)
+    assert required(counted[0].force).time_s[0] == pytest.approx(1e-4, abs=2e-6)
+    assert found.gap < 1.1
+    assert found.model.plant.stiffness_n_per_m == pytest.approx(7.1e5, rel=1e-3)
+    assert found.model.plant.damping_n_s_per_m == pytest.approx(520.0, rel=3e-3)
+    _, same, unmoved_s = fit_plant_and_onset([extract(tap) for tap in taps], 9.81, begun_before)
+    assert unmoved_s == 0.0, "where contact is where it is said to be it stays"
+    assert required(same[0].force).time_s[0] == pytest.approx(1e-4)
+
+
+def test_what_a_tap_says_of_the_plant_is_not_said_twice() -> None:
+    """One tap and the plant that was fitted to it alone: mu_s was off by 1.7 times what was said of it."""
+    pulls = []
+    for seed in range(25):
+        tap = extract(Tap(2000 / 6e4, effects={}).capture(np.random.default_rng(900 + seed)))
+        plant = fit_plant([tap], 9.81)
+        found = plant.estimate(tap, plant.model).mu_s
+        pulls.append((found.value - 0.2) / found.std)
+    assert 0.7 < float(np.sqrt(np.mean(np.square(pulls)))) < 1.3
 
 
 @pytest.mark.parametrize("at_contact_n", [0.0, 30.0])

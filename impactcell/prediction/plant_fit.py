@@ -1,0 +1,51 @@
+"""The plant that was fitted to taps, and what it says of the friction of each of them."""
+
+from dataclasses import dataclass, replace
+
+from impactcell.features import Features
+from impactcell.prediction.estimate import estimate_from_features
+from impactcell.prediction.model import Model
+from impactcell.records import Estimator, FrictionEstimate
+from impactcell.records.uncertainty import plus_minus
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlantFit:
+    """Outcome of a joint fit.
+
+    Attributes
+    ----------
+    model : Model
+        Nominal plant and priors, without predictors.
+    used : tuple of int
+        Cycle numbers of the taps that the fit could use.
+    gap : float
+        RMS of all residuals in blocks, 1 = noise.
+    shared_error : float
+        Relative standard deviation of mu_k/mu_s that all taps share.
+    """
+
+    model: Model
+    used: tuple[int, ...]
+    gap: float
+    shared_error: float
+
+    def estimate(self, tap: Features, model: Model) -> FrictionEstimate:
+        """Estimate the friction of one of the taps that were fitted, by their model, calibrated or not.
+
+        What this tap says of mu_k/mu_s is in the model: said twice, it would be believed too much.
+        """
+        friction = estimate_from_features(tap, model, self.gap)
+        mu_s = friction.mu_s
+        if friction.estimator is Estimator.WAVEFORM:
+            mu_s = replace(mu_s, std=max(mu_s.std, self.shared_error * mu_s.value))
+        return replace(friction, mu_s=mu_s)
+
+    @property
+    def sentence(self) -> str:
+        """The parameters with what is told of their standard deviations."""
+        plant, prior = self.model.plant, self.model.prior
+        stiffness = plus_minus(plant.stiffness_n_per_m, prior.stiffness_std_n_per_m, ".6g", ".2g")
+        damping = plus_minus(plant.damping_n_s_per_m, prior.damping_std_n_s_per_m, ".5g", ".2g")
+        ratio = plus_minus(self.model.ratio, prior.ratio_std, ".4f", ".2g")
+        return f"k {stiffness} N/m, b {damping} N s/m, mu_k/mu_s {ratio} (± is 95 %)"
