@@ -22,8 +22,9 @@ def update_process_noise(
         return _following(settings, state, cycle)
     record = noise_identification.append_cycle(state.commissioning, cycle, cycle.observation.batch_id)
     cycles = len(record.rows)
-    is_ended = cycles >= settings.commissioning_cycles
-    identifies = is_ended or cycles in noise_identification.IDENTIFIED_AT
+    due = cycles - settings.commissioning_delay
+    is_ended = due >= settings.commissioning_cycles
+    identifies = is_ended or due in noise_identification.IDENTIFIED_AT
     state = replace(state, commissioning=None if is_ended else record)
     if cycles in noise_identification.REFITTED_AT:
         values, stds = record.rows[:, noise_identification.VALUE], record.rows[:, noise_identification.STD]

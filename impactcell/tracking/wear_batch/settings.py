@@ -40,6 +40,10 @@ class TrackerSettings:
         Huber's threshold, in standard deviations of the innovation.
     commissioning_cycles : int
         Cycles from which the process noise is learned.
+    commissioning_delay : int
+        By so many cycles random walks are looked for later than else, and commissioning ends later. What is
+        found there takes as long as several cycles; cells of one service that were begun together would all
+        be at it in the same half second, and other cycles would wait.
     level_noise, slope_noise : float
         Process noise to start from: standard deviation a cycle of the random walks of level and slope,
         in standard deviations of one estimate.
@@ -59,6 +63,7 @@ class TrackerSettings:
     outlier_probability: float = 0.001
     outlier_threshold: float = 2.5
     commissioning_cycles: int = 500
+    commissioning_delay: int = 0
     level_noise: float = 0.0
     slope_noise: float = 0.0
     identical_limit: int = 5
