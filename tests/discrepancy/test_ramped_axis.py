@@ -78,15 +78,23 @@ def test_mass_and_friction_are_those_that_went_in(finding: MachineFinding) -> No
         assert finding.final.value((name, 0.0, 0)) == pytest.approx(value, rel=0.05)
 
 
+def _period_s(*channels: Channel) -> float:
+    campaign = Campaign(Excitation.DRIVEN, (Capture(1, math.nan, 2.0, *channels),))
+    return motion_scale(uniform_records(campaign, BASE), BASE.response, 0.0).period_s
+
+
 def test_a_sine_is_averaged_by_its_own_period() -> None:
     time = 2e-3 * np.arange(6000)
-    noise = 1e-5 * np.random.default_rng(5).standard_normal(time.size)
-    shot = Capture(
-        1,
-        math.nan,
-        2.0,
-        Channel(time, np.zeros(time.size), None),
-        Channel(time, 0.1 * np.sin(2.0 * np.pi * time / 1.5) + noise, None),
-    )
-    records = uniform_records(Campaign(Excitation.DRIVEN, (shot,)), BASE)
-    assert motion_scale(records, BASE.response, 0.0).period_s == pytest.approx(1.5, rel=0.02)
+    position = 0.1 * np.sin(2.0 * np.pi * time / 1.5)
+    position += 1e-5 * np.random.default_rng(5).standard_normal(time.size)
+    period = _period_s(Channel(time, np.zeros(time.size), None), Channel(time, position, None))
+    assert period == pytest.approx(1.5, rel=0.02)
+
+
+def test_what_is_left_where_faulty_samples_were_replaced_is_no_ramp() -> None:
+    rng = np.random.default_rng(6)
+    force, position = _record(1)
+    values = position.values.copy()
+    values[rng.choice(values.size, values.size // 200, replace=False)] += 0.05
+    faulty = Channel(position.time_s, values, None)
+    assert _period_s(force, faulty) == pytest.approx(_period_s(force, position), rel=0.5)

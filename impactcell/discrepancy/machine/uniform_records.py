@@ -28,6 +28,8 @@ MAX_HIDDEN_SHARE = 0.25
 SPANS_PER_PERIOD = 11.0
 """Second differences over an eleventh of the period average as a test function of a quarter of it: the
 triangle's standard deviation of span/sqrt(6) is that of (1 - s²)^4, half its support over sqrt(11)."""
+LARGEST_ACCELERATION = 0.97
+"""Share of the samples below what counts as the largest acceleration: a spike touches three of them [1]."""
 MIN_SPAN = 2
 """Least span of a second difference [samples]: of one it is noise as a rule."""
 FINEST = 16
@@ -233,6 +235,8 @@ def _inertial_force(records: Sequence[UniformRecord], period_s: float) -> float 
         second = (
             record.position[2 * span :] - 2.0 * record.position[span:-span] + record.position[: -2 * span]
         )
+        # What is left of a spike is a few large ones of them, and the finer the span the larger.
+        second = np.minimum(np.abs(second), np.quantile(np.abs(second), LARGEST_ACCELERATION))
         scale = (record.inertia / (span * record.step_s) ** 2) ** 2
         total += scale * float(second @ second)
         noise += scale * 6.0 * len(second) * record.noise[0] ** 2  # variance of x - 2 y + z
