@@ -11,10 +11,7 @@ from impactcell.errors import PositioningError
 from impactcell.physics import Plant, free_motion
 from impactcell.positioning import model_hypotheses
 from impactcell.positioning.action_selection import select_action
-from impactcell.positioning.displacement_quantiles import (
-    displacement_quantiles,
-    parameter_scenarios,
-)
+from impactcell.positioning.displacement_quantiles import displacement_quantiles, parameter_scenarios
 from impactcell.positioning.dynamic_programming import Goal, nearer
 from impactcell.positioning.friction_along_stroke import StrokeFriction, update_stroke_friction
 from impactcell.positioning.lookahead_table import (
@@ -39,6 +36,8 @@ SHARE_OF_A_STEP = 0.2
 """Of the bound on overshoot, for a tap that only brings the part nearer, so that more is learned there."""
 WORTH_A_STEP = 0.05
 """Of the remaining distance that such a tap has to come nearer by."""
+LEAST_STEP_M = 1e-6
+"""An encoder's resolution: a tap that is to move less is made only where there is no other."""
 BAND_Z = np.linspace(-3.29, 3.29, 67)  # 99.9 %; close together, since a displacement may fold over
 REMEMBERED = 64  # tables, of parts of different mass
 
@@ -173,22 +172,22 @@ class TapPlanner:
                 f"moves a part of {mass_kg} kg at friction {self._posterior.mu_k:.3f}"
             )
         space = self._limits.space(self._posterior, part, lookahead.strokes)
-        table = lookahead.at(place)
+        table, hardly = lookahead.at(place), None
         for caution in CAUTION:
             action, safest = select_action(
-                distance, table, lookahead.outlook.value(self._limits, caution), space,
+                distance, table, lookahead.outlook.value(self._limits, caution, distance), space,
                 scenarios, self._limits.goal(caution), self.overshoot_probability,
             )  # fmt: skip
-            if action is not None:
+            if action is not None and action.mean >= LEAST_STEP_M:
                 break
-            least = min(least, safest)
+            least, hardly = min(least, safest), hardly or action
         else:
             action, _ = select_action(
                 distance, table, nearer(distance), space,
                 scenarios, self._limits.goal(caution), SHARE_OF_A_STEP * self.overshoot_probability,
             )  # fmt: skip
-            if action is not None and action.mean < WORTH_A_STEP * distance:
-                action = None
+            if action is None or action.mean < WORTH_A_STEP * distance:
+                action = hardly
         if action is None:
             return Unreachable(
                 f"{distance * 1e6:.1f} µm remain, and every tap for a part of {mass_kg:.3g} kg overshoots "
@@ -290,7 +289,8 @@ def _ready() -> None:
     limits = PlannerLimits(50e-6, 0.05, 4e-4, 1e3, 0.1)
     part, place = np.array([20.0, 9.81]), np.array([0.0, 1.0])
     lookahead = build_lookahead(limits, posterior, part, place)
-    value, space = lookahead.outlook.value(limits, 1.0), limits.space(posterior, part, lookahead.strokes)
+    value = lookahead.outlook.value(limits, 1.0, 2e-3)
+    space = limits.space(posterior, part, lookahead.strokes)
     select_action(
         2e-3, lookahead.table, value, space,
         parameter_scenarios(posterior, Z, part, place), Goal(50e-6, 100.0), 0.1,

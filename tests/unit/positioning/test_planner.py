@@ -59,6 +59,18 @@ def test_cells_off_by_a_tenth_end_inside_and_never_beyond(tolerance_m: float) ->
     assert np.mean(counts) < 5.0
 
 
+def test_the_first_task_of_a_cell_does_not_creep() -> None:
+    """Before, 13.6 taps on the mean and 35 at most: taps of some µm, each before one that would settle it."""
+    plant, counts = Plant(7.15e5, 511.5, 0.13, 0.76 * 0.13), []
+    for seed in range(8):
+        planner = TapPlanner(tolerance_m=10e-6, plant=NOMINAL)
+        taps, remaining, last = deliver(planner, plant, 10.06, 38.78e-3, np.random.default_rng(seed))
+        assert last is None
+        assert abs(remaining) <= planner.tolerance_m
+        counts.append(len(taps))
+    assert max(counts) <= 12
+
+
 def test_in_place_is_not_unreachable() -> None:
     planner = TapPlanner(tolerance_m=50e-6)
     assert planner.next_tap(0.0, 10.0) is None
