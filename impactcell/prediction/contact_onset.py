@@ -84,8 +84,8 @@ def fit_plant_and_onset(
     if len(found) > 2 and math.isfinite(onset_s := _lowest([(s, fit.gap**2) for s, fit, _ in found[:3]])):
         with suppress(NotConvergedError):  # then the best of the others stands
             found.append(tried(float(np.clip(onset_s, -0.5 * step_s, 0.5 * step_s))))
-    onset_s, fit, counted = min(found, key=lambda one: one[1].gap)
-    return fit, counted, onset_s
+    onset_s, fit, shifted = min(found, key=lambda one: one[1].gap)
+    return fit, shifted, onset_s
 
 
 def _lowest(points: Sequence[tuple[float, float]]) -> float:
@@ -105,12 +105,12 @@ def _step_s(force: Channel | None) -> float:
 def _counted_from(tap: Features, onset_s: float) -> Features:
     """Give a tap whose times count from another moment; samples that then lie before it are left out."""
 
-    def counted(channel: Channel | None) -> Channel | None:
+    def from_onset(channel: Channel | None) -> Channel | None:
         if channel is None:
             return None
         since = channel.time_s > onset_s
         return replace(channel, time_s=channel.time_s[since] - onset_s, values=channel.values[since])
 
     capture: Capture = tap.capture
-    force, position, actuator = map(counted, (capture.force, capture.position, capture.actuator))
+    force, position, actuator = map(from_onset, (capture.force, capture.position, capture.actuator))
     return extract(replace(capture, force=force, position=position, actuator=actuator))

@@ -22,13 +22,13 @@ class PlantFit:
     gap : float
         RMS of all residuals in blocks, 1 = noise.
     shared_error : float
-        Relative standard deviation of mu_k/mu_s that all taps share.
+        Relative standard deviation of mu_k/mu_s that all taps share; 0 takes each tap's own for all of it.
     """
 
     model: Model
     used: tuple[int, ...]
     gap: float
-    shared_error: float
+    shared_error: float = 0.0
 
     def estimate(self, tap: Features, model: Model) -> FrictionEstimate:
         """Estimate the friction of one of the taps that were fitted, by their model, calibrated or not.
