@@ -244,3 +244,12 @@ def test_noise_is_found_beside_a_motion_and_beside_jumps() -> None:
     coarse = np.round(values[:900] * 0.5) / 0.5  # more than half of the differences are zero
     assert 0.0 < white_noise_std(coarse) < 2.0
     assert math.isnan(white_noise_std(values[:3]))
+
+
+def test_a_raster_in_decimals_is_no_silence() -> None:
+    """Equal steps of 5 µm, read from decimals, differ by rounding; that was taken for all the noise."""
+    steps = np.ones(600)
+    steps[::7] = 2.0
+    position = np.array([float(f"{place:.6f}") for place in 5e-6 * np.cumsum(steps)])
+    assert np.median(np.abs(np.diff(position, 3))) < 1e-17
+    assert 5e-7 < white_noise_std(position) < 5e-6
