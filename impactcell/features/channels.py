@@ -8,7 +8,7 @@ import numpy as np
 from impactcell.errors import CaptureError, NoBreakawayError
 from impactcell.features.noise import noise_std
 from impactcell.numerics.local_polynomial import channel_statistics, mean, running_mean
-from impactcell.records import Capture, Channel, Samples
+from impactcell.records import Capture, Channel, Samples, since_contact
 
 CONTACT_SMOOTHING_S = 2e-4
 """Window of the smoothed force: short against a contact of some 17 ms, long against a sample at 1 MHz."""
@@ -48,6 +48,12 @@ class CheckedForce(CheckedChannel):
     """
 
     smooth: Samples = field(default_factory=lambda: np.empty(0))
+
+    def after_contact(self) -> "CheckedForce":
+        """Give the samples after first contact, at which the force jumps and has no one value."""
+        since = since_contact(self.time_s)
+        time_s, values, smooth = (samples[since] for samples in (self.time_s, self.values, self.smooth))
+        return replace(self, time_s=time_s, values=values, smooth=smooth)
 
 
 def check_channel(channel: Channel | None, name: str) -> CheckedChannel:

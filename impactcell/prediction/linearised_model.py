@@ -23,7 +23,7 @@ from impactcell.prediction.block_averaging import (
     BlockMeans,
     average_blocks,
 )
-from impactcell.records import Capture, Samples, since_contact
+from impactcell.records import Capture, Samples
 
 MU_K, RATIO, STIFFNESS, DAMPING = range(4)
 """Places in theta."""
@@ -210,14 +210,7 @@ def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
     spans = [(time - KINK_SPAN_S, time + KINK_SPAN_S) for time in kinks]
     halt = tap.stroke_m / tap.velocity_m_s
     edges = [halt] if math.isfinite(halt) else []
-    pressed = required(features.force)
-    since = since_contact(pressed.time_s)
-    pressed = replace(
-        pressed,
-        time_s=pressed.time_s[since],
-        values=pressed.values[since],
-        smooth=pressed.smooth[since],
-    )
+    pressed = required(features.force).after_contact()
     force = average_blocks(pressed, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
     jumps = [event.time_s for event in motion.events if event.kind is TapEventKind.CONTACT]
     if jumps or edges:
