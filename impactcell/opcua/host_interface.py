@@ -67,7 +67,8 @@ class ServerLimits:
     hello_s, activation_s : float
         Time a new connection has for its Hello, and then for a session.
     undisturbed_s : float
-        Time that it has before it may have to give way to a newcomer.
+        Time that it has, as has a session that nobody has logged in to, before it may have to give way to a
+        newcomer.
     """
 
     connections: int = 250

@@ -121,7 +121,7 @@ class SessionTable:
         if not idle:
             raise StatusCodeError(ua.StatusCodes.BadTooManySessions)
         oldest = min(idle, key=lambda session: session.last_seen)
-        if time.monotonic() - oldest.last_seen < 1.0:
+        if time.monotonic() - oldest.last_seen < self._limits.undisturbed_s:
             raise StatusCodeError(ua.StatusCodes.BadTooManySessions)
         self.remove(oldest)
 

@@ -66,6 +66,30 @@ async def test_who_has_logged_in_does_not_give_way(bound: str) -> None:
                 await (await here.node(client, "Module/Connected")).read_data_value(False)
 
 
+@pytest.mark.parametrize("undisturbed_s", [0.0, 3600.0])
+async def test_sessions_that_nobody_logs_in_to_give_way(undisturbed_s: float) -> None:
+    """All places are held by sessions without a user: who wants to log in can, but not at once."""
+    async with (
+        site(limits=ServerLimits(sessions=2, undisturbed_s=undisturbed_s, **SLOW)) as here,
+        contextlib.AsyncExitStack() as stack,
+    ):
+        for _ in range(2):
+            idle = await here.client()
+            await idle.connect_socket()
+            stack.callback(idle.disconnect_socket)
+            await idle.send_hello()
+            await idle.open_secure_channel()
+            await idle.create_session()
+        newcomer = await here.client("operator")
+        if undisturbed_s:
+            with pytest.raises(ua.UaStatusCodeError) as refused:
+                await newcomer.connect()
+            assert refused.value.code == codes.BadTooManySessions
+        else:
+            async with newcomer:
+                await (await here.node(newcomer, "Module/Connected")).read_data_value(False)
+
+
 async def test_one_address_has_its_places_and_no_more() -> None:
     limits = ServerLimits(connections=10, connections_per_address=2, undisturbed_s=3600.0, **SLOW)
     async with site(limits=limits) as here, contextlib.AsyncExitStack() as stack:
