@@ -12,6 +12,7 @@ files, and the same installed packages.
 
 import argparse
 import contextlib
+import filecmp
 import multiprocessing
 import os
 import re
@@ -75,6 +76,7 @@ def run(arguments: list[str], log: Path, checkout: Path = ROOT) -> Run:
     command = [sys.executable, "-m", "pytest", *SUITE, *arguments]
     # a summary line is cut at the terminal's width, and the reason with it
     environment = os.environ | {"PYTHONPATH": str(checkout), "COLUMNS": "400"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # as `make test` does
     with log.open("w", encoding="utf-8") as said:
         done = subprocess.run(
             command, cwd=checkout, env=environment, stdout=said, stderr=subprocess.STDOUT, check=False
@@ -93,9 +95,19 @@ def run_in_clone(arguments: list[str], log: Path) -> Run:
         for packages in INSTALLED:
             if (ROOT / packages).is_dir():
                 (checkout / packages).symlink_to(ROOT / packages)
-        for name in ("pyproject.toml", "requirements.lock"):
-            shutil.copystat(ROOT / name, checkout / name)
+        _keep_compiled(checkout)
         return run(arguments, log, checkout)
+
+
+def _keep_compiled(checkout: Path) -> None:
+    """Spare a clone what has been installed and compiled here: both are known by when a file was written."""
+    for copy in checkout.rglob("*"):
+        here = ROOT / copy.relative_to(checkout)
+        if copy.is_file() and here.is_file() and filecmp.cmp(here, copy, shallow=False):
+            shutil.copystat(here, copy)
+    for compiled in ROOT.glob("[!.]*/**/__pycache__"):
+        if "node_modules" not in compiled.parts:
+            shutil.copytree(compiled, checkout / compiled.relative_to(ROOT))
 
 
 def main() -> int:
