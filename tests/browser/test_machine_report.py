@@ -11,7 +11,7 @@ from tests.browser.chromium import DESK, PHONE, Browser
 from tests.browser.shop import judge
 from tests.discrepancy.test_machine_laws import SLIDE_FILE, slide
 
-pytestmark = [pytest.mark.browser, pytest.mark.timeout(300)]
+pytestmark = pytest.mark.browser
 
 
 def test_the_report_of_a_machine(browser: Browser, tmp_path: Path) -> None:

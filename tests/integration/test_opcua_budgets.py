@@ -416,7 +416,7 @@ async def test_a_long_request_that_waits_lets_those_of_others_pass(
 
     def wait() -> None:
         begun.set()
-        may_end.wait(60.0)
+        may_end.wait(PATIENCE_S)
 
     async def waiting(*_: object, **__: object) -> ValuePage:
         await asyncio.to_thread(wait)

@@ -21,6 +21,7 @@ from impactcell.opcua.loop_share import SLICE_S
 from impactcell.quantities import HISTORY
 from impactcell.scada import HistoryValue
 from tests.opcua_server import CELL, START_NS, Site, site
+from tests.patience import PATIENCE_S
 
 pytestmark = pytest.mark.asyncio(loop_scope="module")
 ids, codes = ua.ObjectIds, ua.StatusCodes
@@ -103,7 +104,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 async def _send(client: Client, request: object) -> bytes:
-    return await client.uaclient.protocol.send_request(request, timeout=60)
+    return await client.uaclient.protocol.send_request(request, timeout=PATIENCE_S)
 
 
 async def _level(client: Client) -> ua.NodeId:

@@ -24,6 +24,7 @@ from impactcell.scada import HistoryValue, Role
 from impactcell.scada.users import User, read_users, write_users
 from tests.interop.wire import Wire
 from tests.opcua_server import CELL, PASSWORDS, START_NS, Site, site
+from tests.patience import PATIENCE_S
 
 HERE = Path(__file__).parent / "node"
 MODEL = Path(__file__).resolve().parents[2] / "impactcell" / "scada" / "model"
@@ -221,7 +222,7 @@ async def _run(node: str) -> dict[str, dict]:
 @pytest.mark.interop
 def test_every_row(node: str, subtests: pytest.Subtests) -> None:
     """One client goes through all rows: they are one test, lest two workers run it twice."""
-    results = asyncio.run(asyncio.wait_for(_run(node), 300))
+    results = asyncio.run(asyncio.wait_for(_run(node), PATIENCE_S))
     assert set(results) == set(ROWS)
     for row in ROWS:
         with subtests.test(row):

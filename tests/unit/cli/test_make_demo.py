@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.patience import PATIENCE_S
+
 ROOT = Path(__file__).parents[3]
 INTERRUPTED = "kill -INT $PPID; exit 130"
 """A terminal sends Ctrl-C to every process that it shows: to the recipe's shell as well. What make does
@@ -33,7 +35,7 @@ def test_ctrl_c_is_no_error(tmp_path: Path, demo: str, said: str, code: int) -> 
     environment = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}
     done = subprocess.run(
         ["make", "demo", f"VENV={tmp_path}"],
-        cwd=ROOT, env=environment, start_new_session=True, capture_output=True, text=True, timeout=60,
+        cwd=ROOT, env=environment, start_new_session=True, capture_output=True, text=True, timeout=PATIENCE_S,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
     assert done.returncode == code

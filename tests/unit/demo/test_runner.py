@@ -13,6 +13,7 @@ from impactcell.demo.scenario_setup import DemoSetup, last_target_m
 from impactcell.errors import ImpactCellError
 from impactcell.records import PositioningState
 from tests.snapshots import make_capture, make_snapshot
+from tests.virtual_time import run_virtually
 
 TASKS = {"positioning": {"tasks": [{"target_m": 0.01}, {"target_m": 0.005}]}}
 
@@ -21,19 +22,23 @@ TASKS = {"positioning": {"tasks": [{"target_m": 0.01}, {"target_m": 0.005}]}}
     ("content", "target_m", "over"),
     [(TASKS, 0.005000000222, True), (TASKS, 0.01, False), ({}, math.nan, False)],
 )
-async def test_a_demo_with_a_last_part_ends_with_it(
-    monkeypatch: pytest.MonkeyPatch, content: dict[str, object], target_m: float, over: bool
+def test_a_demo_with_a_last_part_ends_with_it(
+    content: dict[str, object], target_m: float, over: bool
 ) -> None:
-    monkeypatch.setattr(runner, "QUIET_S", 0.05)
     stage = cast("DemoSetup", SimpleNamespace(last_target_m=last_target_m(content)))
-    playing, stop = runner._DemoRun(stage, cycles=None), asyncio.Event()
+    playing = runner._DemoRun(stage, cycles=None)
     state = PositioningState(target_m=target_m)
     playing.snapshots.append(replace(make_snapshot(make_capture(7)), positioning=state))
-    watch = asyncio.create_task(playing._watch(asyncio.Event(), stop))
-    await asyncio.wait({watch}, timeout=0.5)
-    assert (watch.done(), stop.is_set()) == (over, over)
+
+    async def watched() -> tuple[bool, bool]:
+        stop = asyncio.Event()
+        watch = asyncio.create_task(playing._watch(asyncio.Event(), stop))
+        await asyncio.wait({watch}, timeout=10.0 * runner.QUIET_S)
+        watch.cancel()
+        return watch.done(), stop.is_set()
+
+    assert run_virtually(watched()) == (over, over)
     assert playing.messages == ([(7, "that was the last part")] if over else [])
-    watch.cancel()
 
 
 @pytest.mark.parametrize("seen", [0, 1])

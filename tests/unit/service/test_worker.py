@@ -23,6 +23,7 @@ from impactcell.service.journal_writer import JournalWriter
 from impactcell.service.worker import CellWorker
 from impactcell.settings import read_cell
 from tests.integration.processes import CONFIG
+from tests.patience import PATIENCE_S
 from tests.snapshots import make_capture
 
 
@@ -64,7 +65,7 @@ async def test_no_cycle_waits_for_the_journal_to_be_tidied(
 
     def late(name: str) -> Callable[..., None]:
         def work(*_: object) -> None:
-            assert shown.wait(10.0)
+            assert shown.wait(PATIENCE_S)
             done.append(name)
 
         return work

@@ -17,6 +17,7 @@ from impactcell.errors import SettingsError
 from simulator.__main__ import main
 from simulator.scenario import read_scenario
 from simulator.serving import read_register_map
+from tests.patience import PATIENCE_S
 
 CONFIG = Path(__file__).parents[3] / "config"
 GOOD = "format: 1\nregister_map: m.yaml\nstrikes: {period_s: 1}\n"
@@ -116,7 +117,7 @@ def test_missing_files_end_with_code_2(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 def read_registers(port: int, address: int, count: int) -> bytes:
-    with socket.create_connection(("127.0.0.1", port), timeout=20) as link:
+    with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as link:
         link.sendall(bytes([0, 1, 0, 0, 0, 6, 1, 3]) + address.to_bytes(2, "big") + count.to_bytes(2, "big"))
         reply = b""
         while len(reply) < 9 + 2 * count:
@@ -145,7 +146,7 @@ def test_serves_until_it_is_told_to_stop(tmp_path: Path, how: signal.Signals, co
                 pass
         finally:
             process.send_signal(how)
-            out, err = process.communicate(timeout=30)
+            out, err = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == code
     assert (out, err) == ("", "")
     lines = [json.loads(line) for line in truth.read_text().splitlines()]
