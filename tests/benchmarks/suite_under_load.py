@@ -29,8 +29,9 @@ from pathlib import Path
 from tests.benchmarks.table import Table
 
 ROOT = Path(__file__).resolve().parents[2]
-SUITE = ("-n", "auto", "--maxprocesses", "4", "--dist", "worksteal", "-q", "-o", "timeout=3600")
-"""As `make test` runs it, but that a test may take an hour before it counts as hanging."""
+SUITE = ("-n", "auto", "--maxprocesses", "4", "--dist", "worksteal", "-v", "-o", "timeout=3600")
+"""As `make test` runs it, but that each test is told as it ends, and may take an hour before it counts as
+hanging."""
 INSTALLED = ("tests/interop/node/node_modules", "tests/browser/node_modules")
 """Foreign programs that `.ci/run` installs beside the tests; without them those tests skip."""
 LAST_LINES = re.compile(r"^(FAILED|ERROR) .*|^.*\b(?:passed|failed|error)\b.* in .*$", re.MULTILINE)
