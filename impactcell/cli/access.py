@@ -5,6 +5,7 @@ import shlex
 import sys
 from pathlib import Path
 
+from impactcell.cli.paths import check_directory
 from impactcell.errors import AccessError
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
 from impactcell.opcua.host_interface import Role
@@ -111,6 +112,7 @@ def make_certs(pki: Path, application_uri: str | None = None, hosts: list[str] |
     AccessError
         There is a certificate already, or the directory cannot be written.
     """
+    check_directory(pki, AccessError)
     uri = application_uri or default_application_uri()
     certificate, key = make_certificate("impactcell", uri, [*(hosts or []), *own_hosts()])
     make_folders(pki)
@@ -157,9 +159,11 @@ def list_certs(pki: Path) -> None:
     Raises
     ------
     AccessError
-        The directory is absent.
+        The directory is absent, or a file.
     """
-    if not pki.is_dir():
+    if pki.exists() and not pki.is_dir():
+        raise AccessError(f"{pki}: is a file; name the directory that holds own, trusted and rejected")
+    if not pki.exists():
         raise AccessError(f"{pki}: is not there; make it with `impactcell certs make {pki}`")
     for folder in FOLDERS:
         for path in sorted((pki / folder).glob("*")):

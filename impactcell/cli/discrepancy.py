@@ -11,7 +11,7 @@ from impactcell.api.findings import write_findings
 from impactcell.api.machine_findings import investigate_with_base, write_machine_findings
 from impactcell.campaign import Campaign, naming, read
 from impactcell.campaign.recorded_campaign import from_captures
-from impactcell.cli.paths import note_damage, open_journal
+from impactcell.cli.paths import check_directory, note_damage, open_journal
 from impactcell.discrepancy.report import headline, machine_headline
 from impactcell.discrepancy.search import Mapper
 from impactcell.discrepancy.workflow import investigate
@@ -60,8 +60,7 @@ def discrepancy(
     """
     if (campaign is None) == (journal is None):
         raise CampaignError("name either a campaign directory or --journal DB")
-    if output.exists() and not output.is_dir():
-        raise CampaignError(f"{output}: is a file; name a directory")
+    check_directory(output, CampaignError)
     plant = None
     name = "fitted"
     if cell is not None:
@@ -111,8 +110,7 @@ def discrepancy_of_machine(
     CampaignError, SettingsError
         What was given cannot be read or used.
     """
-    if output.exists() and not output.is_dir():
-        raise CampaignError(f"{output}: is a file; name a directory")
+    check_directory(output, CampaignError)
     data = read(campaign)
     with named_steps() as report_step:
         report_step("naming what the base model lacks")

@@ -16,6 +16,7 @@ from impactcell.api.first_model import fit_first_model
 from impactcell.campaign import Campaign, read
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.first_model import say_first_model
+from impactcell.cli.paths import check_directory
 from impactcell.errors import SettingsError
 from impactcell.features import noise_std
 from impactcell.physics import Plant
@@ -118,6 +119,7 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
         cell_name(answers.name)
     except ValueError as error:
         raise SettingsError(f"--name {answers.name!r}: {error}") from error
+    check_directory(directory, SettingsError)
     source = _map_file(answers.register_map)
     cell, model = directory / f"{answers.name}.yaml", directory / f"{answers.name}.model.yaml"
     target_map = directory / source.name

@@ -1,5 +1,6 @@
 """The files that a verb is given, looked at before any work is done."""
 
+import os
 from pathlib import Path
 
 from impactcell.errors import CampaignError, ImpactCellError
@@ -28,6 +29,19 @@ def note_damage(damage: str) -> None:
 
 
 def check_output(file: Path, error: type[ImpactCellError]) -> None:
-    """Raise `error` for a file whose directory is not there, which would else be found after the work."""
+    """Raise `error` for a file that cannot be, which would else be found after the work."""
+    if file.is_dir():
+        raise error(f"{file}: is a directory; name a file in it")
     if not file.parent.is_dir():
         raise error(f"{file}: cannot be written: there is no directory {file.parent}; make it first")
+
+
+def check_directory(directory: Path, error: type[ImpactCellError]) -> None:
+    """Raise `error` for a directory that cannot be written: a file, inside one, or in somebody else's."""
+    if directory.exists() and not directory.is_dir():
+        raise error(f"{directory}: is a file; name a directory")
+    place = next(place for place in directory.absolute().parents if place.exists())
+    if not place.is_dir():
+        raise error(f"{directory}: cannot be written: {place} is a file")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise error(f"{directory}: cannot be written: you may not write in {place}; name another place")

@@ -73,6 +73,8 @@ def read_series(path: Path) -> tuple[list[FrictionObservation], bool]:
     if not rows:
         raise SeriesError(f"{path}:1: empty; the first line is to be cycle,mu_s,mu_s_std[,batch]")
     header = [name.strip() for name in rows[0]]
+    if len(header) == 1 and ";" in header[0]:
+        raise SeriesError(f"{path}:1: is separated by `;`; write it with `,` and decimal points")
     for name in ("cycle", "mu_s"):
         if name not in header:
             raise SeriesError(

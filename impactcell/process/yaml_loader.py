@@ -30,6 +30,14 @@ MOST_NODES = 200_000
 """A file of nested aliases or merges can describe more than memory holds; no honest one comes near this."""
 
 
+_WAYS_OUT: Final = {
+    "found character '\\t' that cannot start any token": "a tab; YAML is indented with spaces",
+    "mapping values are not allowed here": (
+        "a second `:` where none is expected: indent the line as its neighbours, "
+        "put a text with `: ` in quotes"
+    ),
+}
+"""What the parser finds, in words that name the way out."""
 _LAYOUT: Final = "\t\n\r\x85"
 """Control characters that a text of several lines may have."""
 
@@ -108,7 +116,8 @@ def load(path: Path) -> tuple[object, Positions]:
         mark = fault.problem_mark or fault.context_mark
         place = FilePosition(mark.line + 1, mark.column + 1) if mark else FilePosition(1, 1)
         context = f" ({fault.context})" if fault.context else ""
-        raise SettingsError(f"{path}:{place}: {fault.problem}{context}") from fault
+        told = _WAYS_OUT.get(str(fault.problem), f"{fault.problem}{context}")
+        raise SettingsError(f"{path}:{place}: {told}") from fault
     except yaml.reader.ReaderError as fault:
         before = text[: fault.position]
         place = FilePosition(before.count("\n") + 1, fault.position - (before.rfind("\n") + 1) + 1)
@@ -224,6 +233,9 @@ def _explain(
     text = details["msg"].removeprefix("Value error, ").removeprefix("Input ")
     name = _dotted(positions.existing_path(location))
     input_value = details.get("input")
+    if kind in ("model_type", "dict_type"):
+        text = "should be keys with values (`key: value`)"
+        text += ", not a list" if isinstance(input_value, list) else ""
     if kind != "value_error" and isinstance(input_value, str | int | float | bool | None):
         text += f", not {'empty' if input_value is None else repr(input_value)}"
     return positions.value(location), f"{name}: {text}" if name else text

@@ -112,6 +112,7 @@ def test_a_limit_that_is_not_reached_is_told_in_words(tmp_path, capsys):
     ("text", "message"),
     [
         ("", ":1: empty"),
+        ("cycle;mu_s\n1;0,2\n", ":1: is separated by `;`; write it with `,` and decimal points"),
         ("cycle,mu\n1,0.2\n", ":1: no column `mu_s`"),
         ("cycle,mu_s,mu_s\n1,0.2,0.2\n", ":1: column `mu_s` is there 2 times"),
         ("cycle,mu_s,mu_s_std\n", ":2: no cycles"),
