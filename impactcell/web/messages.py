@@ -19,6 +19,7 @@ from impactcell.records import Alarm
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.texts import CATALOGUE, LANGUAGES
 from impactcell.web.texts.import_notes import page_note
+from impactcell.web.texts.reasons import english_reason, german_reason
 
 LEAST_WHOLE = 9.95
 """From here on two significant digits are a whole number."""
@@ -83,6 +84,10 @@ class Messages:
         )
         said = f"{self['probability' if is_probability else 'statistic']} {statistic}"
         return said if math.isnan(evidence.threshold) else f"{said}, {self['threshold']} {threshold}"
+
+    def published_reason(self, reason: str) -> str:
+        """Say why a value is uncertain or missing."""
+        return german_reason(reason) if self.language == "de" else english_reason(reason)
 
     def refusal(self, code: str) -> str:
         """Say why something was not done, by OPC UA's name of it; what an address makes up is not repeated.

@@ -22,6 +22,8 @@ STUDY_TEXTS: Texts = {
     "drop_operators": ("Operators and engineers can drop measurements here.",
                        "Bediener und Ingenieure können hier Messungen ablegen."),
     "no_studies": ("Nothing has been dropped yet.", "Noch wurde nichts abgelegt."),
+    "rows_shown": ("shots are shown; all are in friction.csv",
+                   "Stöße sind gezeigt; alle stehen in friction.csv"),
     "outcome": ("Outcome", "Ergebnis"),
     "stage_receiving": ("is being received", "wird empfangen"),
     "stage_reading": ("is being read", "wird gelesen"),

@@ -6,6 +6,7 @@ import io
 import json
 import re
 import shutil
+import statistics
 import zipfile
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -155,19 +156,35 @@ async def test_friction_of_each_shot(page: Page, verbs: Verbs) -> None:
         results = page.studies.store.results(page.studies.store.find(study))  # type: ignore[arg-type]
         results.mkdir()
         rows = [
-            {"shot": n, "mu_s": 0.2 + 0.01 * n, "mu_s_std": 0.001, "mu_k": "", "quality": "good"}
+            {
+                "shot": n,
+                "mu_s": 0.2 + 0.01 * n,
+                "mu_s_std": 0.001,
+                "mu_k": "",
+                "quality": "good",
+                "reason": "",
+            }
             for n in (1, 2)
         ]
+        doubtful = {"quality": "uncertain", "reason": "mu_s 0.3183 is outside the calibrated 0.15-0.26"}
+        rows += [rows[0] | {"shot": n, "mu_s": 0.3183, "mu_k": 0.1523412} | doubtful for n in range(3, 250)]
         with (results / "friction.csv").open("w", newline="") as file:
             writer = csv.DictWriter(file, rows[0])
             writer.writeheader()
             writer.writerows(rows)
         await client.post(f"/studies/{study}/run", data={"csrf": await csrf_of(client), "goal": "estimate"})
         found = await until(page, study, Stage.DONE)
-        assert found.result["mu_s"] == pytest.approx({"mean": 0.215, "spread": 0.00707, "n": 2}, abs=1e-5)
+        values = [float(row["mu_s"]) for row in rows]
+        expected = {"mean": statistics.mean(values), "spread": statistics.stdev(values), "n": len(values)}
+        assert found.result["mu_s"] == pytest.approx(expected, rel=1e-6)
         text = (await client.get(f"/studies/{study}")).text
-        assert "0.215" in text
+        assert "<td>0.22</td>" in text
         assert "<td>0.0020</td>" in text, "two standard deviations behind ±; the file has one"
+        assert "µs 0.3183 is outside the calibrated" in text
+        assert "200/249 shots are shown" in text
+        german = (await client.get(f"/studies/{study}?lang=de")).text
+        assert "<td>0,3183</td><td>0,0020</td><td>0,15234</td>" in german
+        assert "unsicher: µs 0,3183 liegt außerhalb des Kalibrierten" in german
         assert (await client.get(f"/studies/{study}/files/friction.csv")).text.startswith("shot,")
     assert "--cell" not in verbs.asked[0]
 
