@@ -9,8 +9,8 @@ from impactcell.process.whole_files import directory_beside
 FILES = ("result.json", "model.extended.yaml", "report.html")
 """What a run leaves in its directory."""
 MORE_FILES = ("law_of_*", "report.*.html")
-"""And where it proposes a law that nobody had listed, its effect file, with a base model that with it;
-of shots, the report in further languages."""
+"""And the report in further languages, and where a law that nobody had listed is proposed, its effect file,
+or the base model with it."""
 
 
 def write_files(output: Path, write: Callable[[Path], None]) -> None:

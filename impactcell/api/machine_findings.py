@@ -6,7 +6,7 @@ from pathlib import Path
 from impactcell.api.finding_files import write_files
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine import MachineFinding, investigate_machine
-from impactcell.discrepancy.report import json_text, machine_document, write_machine_report
+from impactcell.discrepancy.report import json_text, machine_document, write_machine_reports
 from impactcell.errors import CampaignError
 from impactcell.settings.base_model import base_model_text, read_base_model
 
@@ -60,6 +60,6 @@ def write_machine_findings(finding: MachineFinding, data: Campaign, output: Path
             proposed = replace(extended, terms=(*terms, law))
             text = base_model_text(proposed, data.excitation, provenance)
             (beside / f"{law.identifier}.yaml").write_text(text, encoding="utf-8")
-        write_machine_report(finding, document, source, beside / "report.html")
+        write_machine_reports(finding, document, source, beside)
 
     write_files(output, write)

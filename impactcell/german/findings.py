@@ -26,6 +26,14 @@ GERMAN_QUANTITIES: Final = {
     "covariate": "Einflussgröße", "ignored": "nichts",
 }  # fmt: skip
 """What a column of a dropped file can mean."""
+GERMAN_STATES: Final = {
+    "speed": "Geschwindigkeit",
+    "load": "Last",
+    "indentation": "Eindrückung",
+    "indentation_rate": "Eindrückgeschwindigkeit",
+    "gap": "Abstand",
+}
+"""What a law may be a function of, beside the quantities."""
 GERMAN_STEPS: Final = {
     "unpacking": "Auspacken",
     "import": "Dateien lesen",
@@ -84,6 +92,17 @@ def with_decimal_commas(text: str) -> str:
     return re.sub(r"(?<=\d)\.(?=\d)", ",", text)
 
 
+def german_equation(equation: str) -> str:
+    """Say the words in the equation of a law in German.
+
+    >>> german_equation("-s(u) sign(q') with s(u) = 0.5 u^2, u the position")
+    "-s(u) sign(q') mit s(u) = 0,5 u^2, u = Position"
+    """
+    names = {**GERMAN_QUANTITIES, **GERMAN_STATES}
+    said = re.sub(r" with (?=s\()", " mit ", with_decimal_commas(equation))
+    return re.sub(r"\b([uw]) the (\w+)", lambda m: f"{m[1]} = {names.get(m[2], m[2])}", said)
+
+
 def german_headline(result: Mapping[str, Any]) -> str:
     """Say the outcome in German; as it was said where its format does not have what it takes."""
     gap = result.get("gap", {}).get("held_out")
@@ -111,7 +130,7 @@ def german_headline(result: Mapping[str, Any]) -> str:
                 said += f" {left}{_where(result)}."
     law = result.get("law")
     if law:
-        said += f" Ein Gesetz, das keine Bibliothek hat, passt dazu: {law['equation']}."
+        said += f" Ein Gesetz, das keine Bibliothek hat, passt dazu: {german_equation(law['equation'])}."
     return f"{said} (Abweichungen an zurückgehaltenen Messungen; 1 ist das Rauschen der Sensoren.)"
 
 

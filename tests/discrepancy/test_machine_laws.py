@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from functools import lru_cache
 from pathlib import Path
 
@@ -26,8 +27,10 @@ from impactcell.discrepancy.machine import (
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.report import machine_result
 from impactcell.errors import CampaignError, SettingsError
+from impactcell.german.findings import with_decimal_commas
 from impactcell.records import Capture, Channel
 from impactcell.settings.base_model import read_base_model
+from tests.discrepancy.test_german_report import Told
 
 COULOMB, CENTRE, WIDTH = 3.0, 0.04, 0.05
 """Friction of the slide [N], and where it is larger, and over what length [m]."""
@@ -120,6 +123,12 @@ def test_law_is_a_base_model_again_and_leaves_nothing(tmp_path: Path) -> None:
     page = (tmp_path / "found" / "report.html").read_text(encoding="utf-8")
     assert "A law that nobody had listed" in page
     assert "s(u) less its mean [N]" in page
+    german = (tmp_path / "found" / "report.de.html").read_text(encoding="utf-8")
+    assert_is_the_same_in_german(page, german)
+    assert "-s(q) sign(q&#39;) mit s(u) = " in german
+    assert result["headline"].endswith(
+        f"falls to {law['held_out']['after']:.2f}: a law that nobody had listed."
+    )
     again = CliRunner().invoke(
         app, [*command, str(tmp_path / "again"), "--base", str(tmp_path / "found" / law["file"])]
     )
@@ -128,6 +137,17 @@ def test_law_is_a_base_model_again_and_leaves_nothing(tmp_path: Path) -> None:
     assert second["verdict"] == "no_gap"
     assert second["law"] is None
     assert not list((tmp_path / "again").glob("law_of_*"))
+
+
+def assert_is_the_same_in_german(english: str, german: str) -> None:
+    cells = [re.findall(r'<td class="n">(-?\d[^<]*)', text) for text in (english, german)]
+    assert [with_decimal_commas(cell.replace(" to ", " bis ")) for cell in cells[0]] == cells[1]
+    reader = Told()
+    reader.feed(german)
+    said = f" {' '.join(reader.pieces)} "
+    for word in ("the", "and", "records", "with", "held", "noise", "gap", "by", "of", "force", "unknown"):
+        assert f" {word} " not in said
+    assert re.findall(r"\d\.\d", said) == []
 
 
 def pendulum(force: float) -> Campaign:

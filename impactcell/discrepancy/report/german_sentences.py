@@ -1,8 +1,4 @@
-"""What the report says in German; each function says the same as the one of its name in `sentences`.
-
-Notes that are not among `_NOTES`, and reasons why no law is proposed, stay as the workflow says them, in
-English.
-"""
+"""What the report says in German; each function says the same as the one of its name in `sentences`."""
 
 import math
 import re
@@ -10,43 +6,22 @@ from typing import Any, Final
 
 from impactcell.discrepancy.data import CHANNELS
 from impactcell.discrepancy.report import sentences
+from impactcell.discrepancy.report.german_notes import Patterns, note, reason
+from impactcell.discrepancy.report.german_words import phrase
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.report.sentences import NOT_SET
 from impactcell.discrepancy.search import UNTESTED
 from impactcell.discrepancy.workflow import DiscrepancyResult
-from impactcell.german.findings import (
-    GERMAN_PHASES,
-    GERMAN_QUANTITIES,
-    german_headline,
-    german_texts,
-    with_decimal_commas,
-)
+from impactcell.german.findings import german_equation as equation
+from impactcell.german.findings import german_headline, with_decimal_commas
 from impactcell.physics.effect import German
 from impactcell.physics.effects import find_effect
 from impactcell.physics.free_column_forms import printed
 
-_WORDS: Final = {
-    **GERMAN_PHASES,
-    **GERMAN_QUANTITIES,
-    "named": "benannt",
-    "tied": "nicht zu unterscheiden",
-    "no_gap": "keine Abweichung",
-    "unknown": "unbekannt",
-    "untested": "nicht geprüft",
-    "tap": "Stoß",
-    "driven": "angetrieben",
-    "dwell": "Ruhezeit",
-    "start": "Anfangslage",
-    "initial_speed": "Anfangsgeschwindigkeit",
-    "order": "Reihenfolge",
-    "speed": "Geschwindigkeit",
-    "indentation": "Eindrückung",
-    "gap": "Abstand",
-    "indentation_rate": "Eindrückgeschwindigkeit",
-    "stated": "angegeben",
-    "estimated": "geschätzt",
-}
-"""Phases, channels, covariates and verdicts, by their names in the workflow."""
+__all__ = [
+    "advice", "equation", "headline", "in_german", "label", "law_sentences", "next_step",
+    "noise_floor_sentence", "note", "phrase", "reason", "setting", "shape", "split_sentence", "written",
+]  # fmt: skip
 _LABELS: Final = {
     "all shots": "alle Stöße",
     "order": "Reihenfolge",
@@ -103,41 +78,6 @@ _SHAPES: Final = (
     (r"largest late in the phase$", "am größten spät in der Phase"),
 )  # fmt: skip
 
-_NOTES: Final = (
-    (r"The noise of (\w+) is not stated; (\S+) was estimated .*",
-     lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus benachbarten Messwerten "
-     "geschätzt, eine untere Schranke, wo es korreliert ist."),
-    (r"The mass of shot (\d+) is not stated and is fitted, block by block\.",
-     r"Die Masse zu Stoß \1 ist nicht angegeben und wird angepasst, Block für Block."),
-    (r"(\d+) of (\d+) training blocks were left out: .*",
-     r"\1 von \2 Blöcken bleiben bei der Anpassung weg: zu nah am Haften oder dem Modell fern."),
-    (r"No force channel: .*", "Keine Kraft: Effekte von Kontakt und Kraftsensor zeigt nur die Bewegung."),
-    (r"No position channel: .*", "Keine Position: Effekte auf das Gleiten sind kaum zu sehen."),
-    (r"No actuator channel: .*",
-     "Kein Antrieb: Nachgeben und Anlauf des Antriebs sind kaum von Dämpfung zu unterscheiden."),
-    (r"One direction only: .*", "Nur eine Richtung: Neigung und Richtungsabhängigkeit sind nicht zu sehen."),
-    (r"One velocity only: .*",
-     "Nur eine Geschwindigkeit: was von ihr abhängt, ist kaum auseinanderzuhalten."),
-    (r"One mass only: .*",
-     "Nur eine Masse: Masse und Steifigkeit, Neigung und Rückstellkraft heben sich weniger voneinander ab."),
-    (r"The mass of (\d+) shots is not stated and is fitted\.",
-     r"Die Masse ist nicht angegeben und wird angepasst (Stöße: \1)."),
-    (r"No replicates: .*",
-     "Keine Wiederholungen: das Rauschen ist nur eine untere Schranke, Abweichung (b) gibt es nicht."),
-    (r"Shot (\d+) has a gap in time; .*",
-     r"Stoß \1 hat eine Lücke in der Zeit; was darin geschah, ist verloren."),
-    (r"Samples before contact \(pretrigger\) of (\d+) shots are left out of the fits\.",
-     r"Messwerte vor dem Kontakt (Stöße: \1) werden nicht angepasst."),
-)  # fmt: skip
-"""Notes on the data."""
-
-
-def phrase(identifier: str) -> str:
-    """Name an effect, a phase, a covariate or a verdict."""
-    if (german := german_texts(identifier)) is not None:
-        return german.name
-    return _WORDS.get(identifier, identifier.replace("_", " "))
-
 
 def label(english: str) -> str:
     """Say a label of a figure; KeyError where it has not been put into German."""
@@ -146,12 +86,12 @@ def label(english: str) -> str:
 
 def setting(english: str) -> str:
     """Say a setting of the next experiment."""
-    return _in_german(english, _SETTINGS)
+    return in_german(english, _SETTINGS)
 
 
 def shape(english: str) -> str:
     """Say what is left along a phase."""
-    return _in_german(english, _SHAPES)
+    return in_german(english, _SHAPES)
 
 
 def written(text: str) -> str:
@@ -159,16 +99,8 @@ def written(text: str) -> str:
     return with_decimal_commas(text)
 
 
-def note(english: str) -> tuple[str, str]:
-    """Say a note on the data: in which language, and the note."""
-    for pattern, german in _NOTES:
-        said, found = re.subn(f"^{pattern}$", german, english)
-        if found:
-            return "de", written(said)
-    return "en", english
-
-
-def _in_german(text: str, pairs: Any) -> str:
+def in_german(text: str, pairs: Patterns) -> str:
+    """Put those parts of a text into German that are among the patterns."""
     for pattern, german in pairs:
         text = re.sub(pattern, german, text)
     return written(text)
@@ -250,6 +182,8 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
         for name, unit, (low, high) in result.law.term.tested
     ]
     return told | {
+        "equation": equation(told["equation"]),
+        "refused": reason(result.law.refused) if result.law.refused else None,
         "subject": "die Streuung der Reibungsfaktoren" if of_factors else "die Verläufe",
         "tested": written(" und ".join(tested)),
     }

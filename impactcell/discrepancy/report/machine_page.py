@@ -1,33 +1,38 @@
 """The page of an investigation with a base model, in the style of the report of shots."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, select_autoescape
 
 from impactcell.discrepancy.machine import CATALOGUE, VALUES, ChosenTerm, MachineFinding, motions
-from impactcell.discrepancy.report import sentences
+from impactcell.discrepancy.report import german_machine_sentences, machine_sentences
 from impactcell.discrepancy.report.law_figures import function_figure
-from impactcell.discrepancy.report.machine_result import SYMBOLS, law_covariate, phrase
-from impactcell.discrepancy.report.page import format_number
+from impactcell.discrepancy.report.machine_result import SYMBOLS, law_covariate
+from impactcell.discrepancy.report.page import report_environment
+from impactcell.german.findings import REPORTS
 
 SHOWN_FORMS = 5
 """Forms alike that the page lists [1]."""
 SHOWN_TRIALS = 15
 """Terms that the page lists [1]."""
+MACHINE_SENTENCES: Mapping[str, ModuleType] = {"en": machine_sentences, "de": german_machine_sentences}
+"""What is said beside the templates, by language: functions of the same names."""
 
 
-def write_machine_report(finding: MachineFinding, document: dict[str, Any], source: str, file: Path) -> None:
-    """Write the report of a finding and its `result.json`; the style is inside the page."""
-    loader = PackageLoader("impactcell.discrepancy.report", "templates")
-    environment = Environment(
-        loader=loader, autoescape=select_autoescape(default=True), trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters.update(number=format_number, share=format_share)
-    context = machine_page_context(finding, document, source)
-    page = environment.get_template("machine.html.j2").render(**context)
-    file.write_text(page, encoding="utf-8")
+def write_machine_reports(
+    finding: MachineFinding, document: dict[str, Any], source: str, directory: Path
+) -> None:
+    """Write the report of a finding and its `result.json` in every language; the style is inside."""
+    for language, name in REPORTS.items():
+        said = MACHINE_SENTENCES[language]
+        environment = report_environment(said)
+        environment.filters["share"] = lambda part, whole, said=said: said.written(format_share(part, whole))
+        template = environment.get_template(f"{name.replace('report', 'machine')}.j2")
+        page = template.render(**machine_page_context(finding, document, source, said))
+        (directory / name).write_text(page, encoding="utf-8")
 
 
 def format_share(part: float, whole: float) -> str:
@@ -39,14 +44,20 @@ def format_share(part: float, whole: float) -> str:
     return f"{round(100.0 * part / whole if whole else 0.0, 1) + 0.0:.1f} %"
 
 
-def machine_page_context(finding: MachineFinding, document: dict[str, Any], source: str) -> dict[str, Any]:
+def machine_page_context(
+    finding: MachineFinding, document: dict[str, Any], source: str, said: ModuleType
+) -> dict[str, Any]:
     """Everything the template shows."""
     first = finding.steps[0] if finding.steps else None
     return {
         "source": source,
         "result": document,
         "verdict": finding.verdict,
-        "words": phrase,
+        "sentence": said.headline(finding),
+        "notes": [said.note(note) for note in document["notes"]],
+        "law_refused": said.reason(finding.law_refused),
+        "setting": said.setting,
+        "equation": said.equation,
         "equations": {name: CATALOGUE[name].equation for name in CATALOGUE},
         "references": {name: CATALOGUE[name].reference for name in CATALOGUE},
         "records": len(finding.records),
@@ -56,14 +67,14 @@ def machine_page_context(finding: MachineFinding, document: dict[str, Any], sour
         "trials": first.trials[:SHOWN_TRIALS] if first else (),
         "free_gains": dict(first.free_gains) if first else {},
         "gain_of_all": first.gain_of_all if first else 0.0,
-        "reason": finding.steps[-1].reason if finding.steps else "",
+        "reason": said.reason(finding.steps[-1].reason if finding.steps else ""),
         "base": [term.choice.name for term in finding.nominal.terms],
-        "law_figure": _law_figure(finding),
+        "law_figure": _law_figure(finding, said),
         "shown_forms": SHOWN_FORMS,
     }
 
 
-def _law_figure(finding: MachineFinding) -> str:
+def _law_figure(finding: MachineFinding, said: ModuleType) -> str:
     """Spline of what remains, and the law beside it; empty where nothing is proposed."""
     law = finding.law
     if law is None:
@@ -86,5 +97,5 @@ def _law_figure(finding: MachineFinding) -> str:
         met[(met >= law.tested[0]) & (met <= law.tested[1])],
         (covariate, unit, force),
         less_mean=True,
-        said=sentences,
+        said=said,
     )

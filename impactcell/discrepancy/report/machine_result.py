@@ -1,4 +1,4 @@
-"""`result.json` and headline of an investigation with a base model: the format of the workflow of shots."""
+"""`result.json` of an investigation with a base model: the format of the workflow of shots."""
 
 import math
 from typing import Any
@@ -17,9 +17,9 @@ from impactcell.discrepancy.machine import (
     simulate_held_out,
     term_of,
 )
+from impactcell.discrepancy.report.machine_sentences import headline, law_equation
 from impactcell.discrepancy.report.result import FORMAT, SPLINE_ONLY, experiments, round_digits
 from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
-from impactcell.german.findings import enumerated
 
 SYMBOLS = {
     Coordinate.TRANSLATION: {"force": "N", "F": "n", "q": "m"},
@@ -46,39 +46,6 @@ def parameter_name(name: str, unit: str, coordinate: Coordinate) -> str:
     return f"{name}_{slug}" if slug else name
 
 
-def phrase(name: str) -> str:
-    """Name of a term as one would say it."""
-    identifier, _, column = name.partition("(")
-    return identifier.replace("_", " ") + (f" by {column.rstrip(')')}" if column else "")
-
-
-def machine_headline(finding: MachineFinding) -> str:
-    """Say what is established and what remains."""
-    before, after = finding.fall.before, finding.fall.after
-    if finding.verdict == "untested":
-        counts = f"{len(finding.training)} to fit and {len(finding.held_out)} held out"
-        return (
-            f"Too few blocks to say: {counts}, about {finding.missing_blocks} more are needed. The held-out "
-            f"gap of the base model is {before:.2f} noise floors."
-        )
-    if finding.verdict == "no_gap":
-        return f"The base model explains these records: the held-out gap is {before:.2f} noise floors."
-    if finding.verdict == "unknown":
-        said = f"No known term explains a held-out gap of {before:.2f} noise floors"
-        if finding.unconfirmed:
-            names = enumerated([*map(phrase, finding.unconfirmed)], "and")
-            said = f"{names.capitalize()} would explain what fitted, but held-out records do not confirm it"
-        reason = finding.steps[0].reason if finding.steps else ""
-        return f"{said}: {reason}." if reason else f"{said}."
-    groups = [
-        " or ".join(map(phrase, (name, *finding.tied_with.get(name, ())))) for name in finding.established
-    ]
-    tied = any(finding.tied_with.values())
-    missing = enumerated(groups, "and") + (", which these records cannot tell apart" if tied else "")
-    said = f"Missing: {missing}; the held-out gap falls from {before:.2f} to {after:.2f} noise floors."
-    return said if finding.is_at_floor else f"{said} Something remains that it does not explain."
-
-
 def machine_document(finding: MachineFinding) -> dict[str, Any]:
     """Outcome as `result.json` has it."""
     errors = simulate_held_out(finding, finding.nominal), simulate_held_out(finding, finding.final)
@@ -88,7 +55,7 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "verdict": finding.verdict,
-        "headline": machine_headline(finding),
+        "headline": headline(finding),
         "effects": [
             _effect(finding, term) for term in finding.final.terms if term.choice.name in finding.established
         ],
@@ -156,7 +123,7 @@ def _law(finding: MachineFinding) -> dict[str, Any]:
         "place": FREE_FORMS[LAW_PLACES[law.place]],
         "covariates": [covariate],
         "form": SPLINE_ONLY if law.choice is None or law.choice.law is None else law.choice.law.name,
-        "equation": FREE_FORMS[LAW_PLACES[law.place]] if law.choice is None else term_of(law.choice).equation,
+        "equation": law_equation(law),
         "parameters": {} if chosen is None else _law_parameters(finding, chosen),
         "equivalents": list(law.equivalents),
         "rival_places": [FREE_FORMS[LAW_PLACES[place]] for place in law.rival_places],

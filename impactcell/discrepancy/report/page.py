@@ -35,13 +35,20 @@ def write_reports(result: DiscrepancyResult, source: str, directory: Path) -> No
 
 def write_report(result: DiscrepancyResult, source: str, file: Path, language: str = "en") -> None:
     """Write the report in one language; pictures and style are inside the page."""
+    environment = report_environment(SENTENCES[language])
+    template = environment.get_template(f"{REPORTS[language]}.j2")
+    page = template.render(**page_context(result, source, language))
+    file.write_text(page, encoding="utf-8")
+
+
+def report_environment(said: ModuleType) -> Environment:
+    """Templates, with the filters that write numbers and words as a language does."""
     environment = Environment(
         loader=PackageLoader("impactcell.discrepancy.report", "templates"),
         autoescape=select_autoescape(default=True),
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    said = SENTENCES[language]
     environment.filters.update(
         zip=zip,
         words=said.phrase,
@@ -49,9 +56,7 @@ def write_report(result: DiscrepancyResult, source: str, file: Path, language: s
         number=lambda value: said.written(format_number(value)),
         grouped=lambda value, decimals: said.written(format_thousands(value, decimals)),
     )
-    template = environment.get_template(f"{REPORTS[language]}.j2")
-    page = template.render(**page_context(result, source, language))
-    file.write_text(page, encoding="utf-8")
+    return environment
 
 
 def format_number(value: float) -> str:

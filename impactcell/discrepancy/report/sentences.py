@@ -24,8 +24,18 @@ def written(text: str) -> str:
     return text
 
 
+def equation(english: str) -> str:
+    """Say the equation of a law."""
+    return english
+
+
 def note(english: str) -> tuple[str, str]:
     """Say a note on the data: in which language, and the note."""
+    return "en", english
+
+
+def reason(english: str) -> tuple[str, str]:
+    """Say why nothing is proposed: in which language, and the reason."""
     return "en", english
 
 
@@ -131,7 +141,7 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
         for name, unit, (low, high) in finding.term.tested
     ]
     return {
-        "refused": finding.refused,
+        "refused": reason(finding.refused) if finding.refused else None,
         "equation": form.effect.equation if law is None else law.equation,
         "spline_only": law is None,
         "subject": "spread of the friction factors" if form.is_between_shots else "traces",

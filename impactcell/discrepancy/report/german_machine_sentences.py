@@ -1,0 +1,73 @@
+"""What the report of a machine says in German; each function says what that of `machine_sentences` does."""
+
+from typing import Final
+
+from impactcell.discrepancy.machine import MachineFinding
+from impactcell.discrepancy.report.german_notes import Patterns, note, reason
+from impactcell.discrepancy.report.german_sentences import equation, in_german, label, written
+from impactcell.discrepancy.report.german_words import term_name as phrase
+from impactcell.discrepancy.report.machine_sentences import law_equation
+from impactcell.german.findings import enumerated
+
+__all__ = ["equation", "headline", "label", "note", "phrase", "reason", "setting", "written"]
+_SETTINGS: Final[Patterns] = (
+    (r"^nothing from a fifth to twice of what was done .*",
+     ("nichts vom Fünftel bis zum Doppelten des Bisherigen unterscheidet sie: eines von beiden für sich "
+      "messen")),
+    (r"^shot (\d+) again", r"Messung \1 noch einmal"),
+    (r"(?<=\d) and (?=-?[\d.]+)", " und "),
+    (r", its motion (.+) times as fast", r", die Bewegung \1-mal so schnell"),
+    (r", its motion (.+) times as wide", r", die Bewegung \1-mal so weit"),
+    (r", its drive (.+) times as fast", r", der Antrieb \1-mal so schnell"),
+    (r", its drive (.+) times as strong", r", der Antrieb \1-mal so stark"),
+    (r", released from (.+) times as far", r", aus \1-mal so weit losgelassen"),
+    (r", (.+) at (?=-?[\d.])", r", \1 auf "),
+    (r", as often each$", ", je gleich oft"),
+)  # fmt: skip
+"""What to record next."""
+
+
+def headline(finding: MachineFinding) -> str:
+    """Say what is established and what remains."""
+    before, after = finding.fall.before, finding.fall.after
+    if finding.verdict == "untested":
+        said = (
+            f"Zu wenige Blöcke für eine Aussage: {len(finding.training)} angepasst, {len(finding.held_out)} "
+            f"zurückgehalten, etwa {finding.missing_blocks} weitere sind nötig. An zurückgehaltenen ist die "
+            f"Abweichung des Grundmodells {before:.2f} Rauschschwellen."
+        )
+    elif finding.verdict == "no_gap":
+        said = (
+            "Das Grundmodell erklärt diese Messungen: an zurückgehaltenen ist die Abweichung "
+            f"{before:.2f} Rauschschwellen."
+        )
+    elif finding.verdict == "unknown":
+        said = f"Kein bekannter Term erklärt eine Abweichung von {before:.2f} Rauschschwellen"
+        if finding.unconfirmed:
+            names = enumerated([*map(phrase, finding.unconfirmed)], "und")
+            said = f"{names} würde angepasste Messungen erklären, zurückgehaltene bestätigen es nicht"
+        why = reason(finding.steps[0].reason)[1] if finding.steps else ""
+        said = f"{said}: {why}." if why else f"{said}."
+    else:
+        groups = [
+            " oder ".join(map(phrase, (name, *finding.tied_with.get(name, ()))))
+            for name in finding.established
+        ]
+        tied = " (diese Messungen unterscheiden es nicht)" if any(finding.tied_with.values()) else ""
+        said = (
+            f"Es fehlt: {enumerated(groups, 'und')}{tied}; an zurückgehaltenen Messungen fällt die "
+            f"Abweichung von {before:.2f} auf {after:.2f} Rauschschwellen."
+        )
+        if not finding.is_at_floor:
+            said += " Etwas bleibt, das es nicht erklärt."
+    if finding.law is not None:
+        said += (
+            f" Mit {equation(law_equation(finding.law))} fällt die Abweichung auf "
+            f"{finding.law.fall.after:.2f}: ein Gesetz, das keine Liste hatte."
+        )
+    return written(said)
+
+
+def setting(english: str) -> str:
+    """Say which records to make next."""
+    return in_german(english, _SETTINGS)

@@ -1,0 +1,204 @@
+"""Notes on the data, and reasons why nothing is proposed, in German.
+
+Data, laws and machines say theirs in English, for `result.json` too. What no pattern here knows stays as it
+was said, and is marked as English.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from typing import Final
+
+from impactcell.discrepancy.report.german_words import phrase, term_name
+from impactcell.german.findings import with_decimal_commas
+
+Patterns = Sequence[tuple[str, str | Callable[[re.Match[str]], str]]]
+"""English as a pattern, and German as `re.sub` takes it; a function gives nothing where it knows no part."""
+ENDS: Final = {"upper": "oberen", "lower": "unteren"}
+"""Ends of a channel's range."""
+FAULTS: Final = {
+    "outliers": "Ausreißer",
+    "clipping": "Begrenzung",
+    "dropouts": "Aussetzer",
+    "drift": "Drift",
+    "late channel": "verspäteter Kanal",
+    "constant channel": "konstanter Kanal",
+    "no motion": "keine Bewegung",
+    "presliding only": "nur Vorgleiten",
+}
+"""Kinds of what is wrong with data."""
+ADDS_UP: Final = (
+    ": die Kräfte stimmen besser, aber eine kleine konstante Kraft, die sich von Messung zu Messung "
+    "unterscheidet, summiert sich auf"
+)
+"""Why positions may err more where forces agree better."""
+DATA_FAULTS: Final[Patterns] = (
+    (r"the (\w+) is constant at (\S+): .*",
+     lambda m: f"{phrase(m[1])} steht konstant auf {m[2]}: nicht angeschlossen, oder die falsche Spalte"),
+    (r"(\d+) outliers in the (\w+), the first at (\S+) s \((\S+) amid (\S+)\): .*",
+     lambda m: f"Ausreißer ({phrase(m[2])}): {m[1]}, der erste bei {m[3]} s ({m[4]} inmitten von {m[5]}): "
+     "Kabel und Schirmung prüfen, oder sie weglassen"),
+    (r"the (\w+) stands at its (\w+) end, (\S+), for (\d+) samples from (\S+) s \((\d+) in all\): .*",
+     lambda m: f"{phrase(m[1])} steht {m[4]} Messwerte lang am {ENDS[m[2]]} Ende, {m[3]}, ab {m[5]} s "
+     f"({m[6]} insgesamt): abgeschnitten; einen weiteren Messbereich wählen"),
+    (r"the (\w+) is stuck at (\S+) for (\d+) samples from (\S+) s \((\d+) such stretches\): .*",
+     lambda m: f"{phrase(m[1])} bleibt {m[3]} Messwerte lang auf {m[2]} stehen, ab {m[4]} s (so an {m[5]} "
+     "Stellen): Messwerte gingen verloren"),
+    (r"samples of the (\w+) are missing in (\d+) places, the first for (\S+) ms from (\S+) s: .*",
+     lambda m: f"{phrase(m[1])}: Messwerte fehlen an {m[2]} Stellen, zuerst {m[3]} ms lang ab {m[4]} s: was "
+     "dabei geschah, ist verloren"),
+    (r"the part does not move: its position stays within (\S+) m, noise is (\S+) m",
+     r"das Teil bewegt sich nicht: seine Position bleibt innerhalb von \1 m, das Rauschen ist \2 m"),
+    (r"its position follows the force as on a spring: .*",
+     ("seine Position folgt der Kraft wie an einer Feder: es gleitet nie, oder eine Feder oder sein Gewicht "
+      "überwiegt die Reibung bei weitem; stärker antreiben")),
+    (r"the part never slides: it moves by (\S+) m and springs back, .*",
+     r"das Teil gleitet nie: es bewegt sich um \1 m und federt zurück (Vorgleiten); stärker stoßen"),
+    (r"the (\w+) is recorded (\S+) ms after the (\w+) \((\d+) shots\): .*",
+     lambda m: f"{phrase(m[1])} ist {m[2]} ms später aufgezeichnet als {phrase(m[3])} ({m[4]} Stöße): "
+     "Filter und Uhr dieses Kanals prüfen, bevor ein Gesetz schuld ist"),
+    (r"the force at rest goes from (\S+) N to (\S+) N over (\d+) shots: .*",
+     r"die Kraft in Ruhe geht von \1 N auf \2 N über \3 Stöße: Sensor tarieren, warm werden lassen"),
+)  # fmt: skip
+"""Messages of `impactcell.quality`."""
+
+
+def _data_fault(match: re.Match[str]) -> str:
+    kind, shot, message, others = match.groups()
+    place = "" if shot is None else f"Stoß {shot}: "
+    more = "" if others is None else f"; ebenso in weiteren Stößen: {others}"
+    said = _of(message, DATA_FAULTS)
+    return "" if said is None else f"Daten, {FAULTS[kind]}: {place}{said}{more}."
+
+
+NOTES: Final[Patterns] = (
+    (r"Data, ([^:]+): (?:shot (\d+): )?(.*?)(?:; the like in (\d+) more shots)?\.", _data_fault),
+    (r"The noise of (\w+) is not stated; (\S+) was estimated .*",
+     lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus benachbarten Messwerten "
+     "geschätzt, eine untere Schranke, wo es korreliert ist."),
+    (r"The mass of shot (\d+) is not stated and is fitted, block by block\.",
+     r"Die Masse zu Stoß \1 ist nicht angegeben und wird angepasst, Block für Block."),
+    (r"(\d+) of (\d+) training blocks were left out: .*",
+     r"\1 von \2 Blöcken bleiben bei der Anpassung weg: zu nah am Haften oder dem Modell fern."),
+    (r"No force channel: .*", "Keine Kraft: Effekte von Kontakt und Kraftsensor zeigt nur die Bewegung."),
+    (r"No position channel: .*", "Keine Position: Effekte auf das Gleiten sind kaum zu sehen."),
+    (r"No actuator channel: .*",
+     "Kein Antrieb: Nachgeben und Anlauf des Antriebs sind kaum von Dämpfung zu unterscheiden."),
+    (r"One direction only: .*", "Nur eine Richtung: Neigung und Richtungsabhängigkeit sind nicht zu sehen."),
+    (r"One velocity only: .*",
+     "Nur eine Geschwindigkeit: was von ihr abhängt, ist kaum auseinanderzuhalten."),
+    (r"One mass only: .*",
+     "Nur eine Masse: Masse und Steifigkeit, Neigung und Rückstellkraft heben sich weniger voneinander ab."),
+    (r"The mass of (\d+) shots is not stated and is fitted\.",
+     r"Die Masse ist nicht angegeben und wird angepasst (Stöße: \1)."),
+    (r"No replicates: .*",
+     "Keine Wiederholungen: das Rauschen ist nur eine untere Schranke, Abweichung (b) gibt es nicht."),
+    (r"Shot (\d+) has a gap in time; .*",
+     r"Stoß \1 hat eine Lücke in der Zeit; was darin geschah, ist verloren."),
+    (r"Samples before contact \(pretrigger\) of (\d+) shots are left out of the fits\.",
+     r"Messwerte vor dem Kontakt (Stöße: \1) werden nicht angepasst."),
+    (r"(\d+) of (\d+) samples stood far from their neighbours and were replaced\.",
+     r"\1 von \2 Messwerten lagen weit von ihren Nachbarn und wurden ersetzt."),
+    (r"Nothing drives: (\w+) cannot be seen and is held at its stated value\.",
+     r"Nichts treibt an: \1 ist nicht zu sehen und bleibt bei dem angegebenen Wert."),
+    (r"A free motion shows accelerations only: .*",
+     ("Eine freie Bewegung zeigt nur Beschleunigungen: Die Trägheit bleibt bei dem angegebenen Wert, und "
+      "jede Kraft zählt in Einheiten, die mit ihr gehen.")),
+    (r"Inertia, gravity and gain of the force are all free: .*",
+     ("Trägheit, Schwerkraft und Verstärkung der Kraft sind alle frei: Die Trägheit bleibt fest, als Einheit "
+      "von allem.")),
+    (r"(.+): on these records like inertia, gravity or drive, and so not looked for\.",
+     lambda m: f"{_terms(m[1])}: auf diesen Messungen wie Trägheit, Schwerkraft oder Antrieb, darum nicht "
+     "gesucht."),
+    (r"(\S+) shows only beside (\S+), which hides it on these records; .*",
+     lambda m: f"{term_name(m[1])} zeigt sich nur neben „{term_name(m[2])}“, das es auf diesen Messungen "
+     f"verdeckt; „{term_name(m[2])}“ wird nicht genannt."),
+    (r"Simulated open loop, held-out records are (\S+ .+?) off with it, (\S+) without(:?).*\.",
+     lambda m: "Ohne Rückführung simuliert liegen zurückgehaltene Messungen "
+     f"mit ihm um {m[1]} daneben, ohne um {m[2]}{ADDS_UP if m[3] else ''}."),
+)  # fmt: skip
+"""Notes of campaigns, of noise floors and of machines."""
+REASONS: Final[Patterns] = (
+    (r"of two covariates: (.*)",
+     lambda m: f"über zwei Größen: {said}" if (said := _of(m[1], REASONS)) else ""),
+    (r"on held-out (?:shots|blocks) the gap does not fall by more than chance",
+     "an Zurückgehaltenem fällt die Abweichung nicht mehr als durch Zufall"),
+    (r"on held-out shots it says no more than the best function of one by more than chance",
+     "an zurückgehaltenen Stößen sagt sie über die beste von einer Größe hinaus nur, was Zufall ist"),
+    (r"no second one was gone through far enough", "keine zweite wurde weit genug durchfahren"),
+    (r"the best term, ([^;]*), leaves (\S+) noise floors: [^;]* no function of ([^;]+?)( alone)?",
+     lambda m: f"der beste Term, {m[1]}, lässt {m[2]} Rauschschwellen übrig: was fehlt, ist keine Funktion "
+     f"{'allein ' if m[4] else ''}von {_quantities(m[3])}"),
+    (r"the term would give energy: ([^;]*) becomes negative in the range [^;]*",
+     r"der Term gäbe Energie ab: \1 wird im durchfahrenen Bereich negativ, also fehlt etwas anderes"),
+    (r"the smoothest spline predicts best, so that the data tell nothing of how the term bends",
+     "der glatteste Spline sagt am besten voraus, so dass die Daten nichts von einer Krümmung sagen"),
+    (r"shots over a wider range of ([^;]+) would",
+     lambda m: f"Stöße über einen größeren Bereich von {_quantities(m[1])} täten es"),
+    (r"the columns? ([^;]+) had fewer than (\d+) different values, [^;]*",
+     lambda m: f"zu wenig verschiedene Werte für eine Funktion (unter {m[2]}) hatte: "
+     f"{m[1].replace(' and ', ' und ')}"),
+    (r"no function of speed, load or position helps block after block that it was not fitted to",
+     ("keine Funktion von Geschwindigkeit, Last oder Ort hilft in einem Block um den anderen, der nicht "
+      "angepasst wurde")),
+    (r"an encoder that turns off its centre does as well as any function of speed, load or position",
+     ("ein Drehgeber, der außermittig sitzt, erklärt es so gut wie jede Funktion von Geschwindigkeit, Last "
+      "oder Ort")),
+    (r"position_eccentricity among the nuisances of the base model would tell",
+     "position_eccentricity unter den nuisances des Grundmodells zeigte es"),
+    (r"simulated open loop, the law that fits best errs no less on held-out records than no law",
+     "ohne Rückführung simuliert irrt das beste Gesetz an Zurückgehaltenem nicht weniger als keines"),
+    (r"with the law that fits best friction would give energy in the range that was gone through",
+     "mit dem besten Gesetz gäbe die Reibung im durchfahrenen Bereich Energie ab"),
+    (r"no term does better in block after block that it was not fitted to",
+     "kein Term ist in einem Block um den anderen besser, der nicht angepasst wurde"),
+    (r"no term closes a fifth of the gap", "kein Term schließt ein Fünftel der Abweichung"),
+    (r"no term stands out from what all of them close together",
+     "kein Term hebt sich von dem ab, was alle zusammen schließen"),
+    (r"the shape of the best term came to the end of its range",
+     "die Form des besten Terms kam an das Ende ihres Bereichs"),
+    (r"a free form in the same place does much better than any named term",
+     "eine freie Form an derselben Stelle ist viel besser als jeder benannte Term"),
+    (r"beside a remainder one term is named at most",
+     "neben einem Rest wird höchstens ein Term genannt"),
+)  # fmt: skip
+"""Why no law is proposed and no further term named: parts of a sentence."""
+
+
+def note(english: str) -> tuple[str, str]:
+    """Say a note on the data: in which language, and the note."""
+    return _marked(english, _of(english, NOTES))
+
+
+def reason(english: str) -> tuple[str, str]:
+    """Say why nothing is proposed: in which language, and the reason.
+
+    >>> reason("no term closes a fifth of the gap")
+    ('de', 'kein Term schließt ein Fünftel der Abweichung')
+    >>> reason("no term closes a fifth of the gap; nobody knows why")
+    ('en', 'no term closes a fifth of the gap; nobody knows why')
+    """
+    return _marked(english, _of(english, REASONS))
+
+
+def _marked(english: str, german: str | None) -> tuple[str, str]:
+    return ("en", english) if german is None else ("de", with_decimal_commas(german))
+
+
+def _of(english: str, patterns: Patterns) -> str | None:
+    """Say a text whole, or else part by part; None where one of its parts is not known."""
+    for pattern, german in patterns:
+        if match := re.fullmatch(pattern, english, re.DOTALL):
+            return (match.expand(german) if isinstance(german, str) else german(match)) or None
+    first, separator, rest = english.partition("; ")
+    if not separator:
+        return None
+    parts = _of(first, patterns), _of(rest, patterns)
+    return None if None in parts else "; ".join(map(str, parts))
+
+
+def _terms(names: str) -> str:
+    return ", ".join(term_name(name.replace(" ", "_")) for name in names.split(", "))
+
+
+def _quantities(english: str) -> str:
+    return " und ".join(phrase(name.replace(" ", "_")) for name in english.split(" and "))

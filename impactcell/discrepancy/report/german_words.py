@@ -1,0 +1,59 @@
+"""What the report calls things in German: phases, channels, covariates, verdicts, effects and terms."""
+
+from typing import Final
+
+from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, GERMAN_STATES, german_texts
+
+WORDS: Final = {
+    **GERMAN_PHASES,
+    **GERMAN_QUANTITIES,
+    **GERMAN_STATES,
+    "named": "benannt",
+    "tied": "nicht zu unterscheiden",
+    "no_gap": "keine Abweichung",
+    "unknown": "unbekannt",
+    "untested": "nicht geprüft",
+    "tap": "Stoß",
+    "driven": "angetrieben",
+    "dwell": "Ruhezeit",
+    "start": "Anfangslage",
+    "initial_speed": "Anfangsgeschwindigkeit",
+    "order": "Reihenfolge",
+    "stated": "angegeben",
+    "estimated": "geschätzt",
+}
+"""Phases, channels, covariates and verdicts, by their names in the workflow."""
+TERMS: Final = {
+    "coulomb_friction": "Coulombsche Reibung",
+    "directional_viscous_friction": "Richtungsabhängige viskose Reibung",
+    "load_dependent_friction": "Lastabhängige Reibung",
+    "covariate_friction": "Reibung je Einflussgröße",
+    "covariate_force": "Kraft je Einflussgröße",
+    "periodic_force": "Periodische Kraft",
+    "hardening_spring": "Verhärtende Feder",
+    "presliding_hysteresis": "Hysterese vor dem Gleiten",
+    "friction_over_speed": "Reibung über der Geschwindigkeit",
+    "friction_over_load": "Reibung über der Last",
+    "friction_over_position": "Reibung über dem Ort",
+    "force_over_position": "Kraft über dem Ort",
+    "force_over_speed": "Kraft über der Geschwindigkeit",
+}
+"""Terms and free forms of a machine that the library of effects does not have."""
+
+
+def phrase(identifier: str) -> str:
+    """Name an effect, a phase, a covariate or a verdict."""
+    if (german := german_texts(identifier)) is not None:
+        return german.name
+    return WORDS.get(identifier, identifier.replace("_", " "))
+
+
+def term_name(name: str) -> str:
+    """Name a term of a machine, with its column where it is of one; the rest as `phrase` does.
+
+    >>> term_name("covariate_friction(pressure_bar)"), term_name("viscous_friction")
+    ('Reibung je Einflussgröße (pressure_bar)', 'Viskose Reibung')
+    """
+    identifier, _, column = name.partition("(")
+    said = TERMS.get(identifier) or phrase(identifier)
+    return f"{said} ({column}" if column else said

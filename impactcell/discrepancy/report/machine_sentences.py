@@ -1,0 +1,55 @@
+"""What the report of a machine says beside its template."""
+
+from impactcell.discrepancy.machine import FREE_FORMS, LAW_PLACES, MachineFinding, MachineLaw, term_of
+from impactcell.discrepancy.report.sentences import equation, label, note, reason, setting, written
+from impactcell.german.findings import enumerated
+
+__all__ = ["equation", "headline", "label", "note", "phrase", "reason", "setting", "written"]
+
+
+def phrase(name: str) -> str:
+    """Name of a term as one would say it."""
+    identifier, _, column = name.partition("(")
+    return identifier.replace("_", " ") + (f" by {column.rstrip(')')}" if column else "")
+
+
+def headline(finding: MachineFinding) -> str:
+    """Say what is established, what remains, and which law would explain it, if one was found."""
+    law = finding.law
+    if law is None:
+        return _conclusion(finding)
+    return (
+        f"{_conclusion(finding)} With {law_equation(law)} the held-out gap falls to {law.fall.after:.2f}: "
+        "a law that nobody had listed."
+    )
+
+
+def law_equation(law: MachineLaw) -> str:
+    """Equation of a law, or where only a spline does as well that of its place."""
+    return FREE_FORMS[LAW_PLACES[law.place]] if law.choice is None else term_of(law.choice).equation
+
+
+def _conclusion(finding: MachineFinding) -> str:
+    before, after = finding.fall.before, finding.fall.after
+    if finding.verdict == "untested":
+        counts = f"{len(finding.training)} to fit and {len(finding.held_out)} held out"
+        return (
+            f"Too few blocks to say: {counts}, about {finding.missing_blocks} more are needed. The held-out "
+            f"gap of the base model is {before:.2f} noise floors."
+        )
+    if finding.verdict == "no_gap":
+        return f"The base model explains these records: the held-out gap is {before:.2f} noise floors."
+    if finding.verdict == "unknown":
+        said = f"No known term explains a held-out gap of {before:.2f} noise floors"
+        if finding.unconfirmed:
+            names = enumerated([*map(phrase, finding.unconfirmed)], "and")
+            said = f"{names.capitalize()} would explain what fitted, but held-out records do not confirm it"
+        reason = finding.steps[0].reason if finding.steps else ""
+        return f"{said}: {reason}." if reason else f"{said}."
+    groups = [
+        " or ".join(map(phrase, (name, *finding.tied_with.get(name, ())))) for name in finding.established
+    ]
+    tied = any(finding.tied_with.values())
+    missing = enumerated(groups, "and") + (", which these records cannot tell apart" if tied else "")
+    said = f"Missing: {missing}; the held-out gap falls from {before:.2f} to {after:.2f} noise floors."
+    return said if finding.is_at_floor else f"{said} Something remains that it does not explain."
