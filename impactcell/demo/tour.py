@@ -3,41 +3,87 @@
 from collections.abc import Mapping
 from typing import Any
 
+from impactcell.alarms import Message
+from impactcell.german.findings import german_effect
 from impactcell.web import TourStop
 
-WEAR = "Trend of the cell: the level rises towards the dashed limit, and the cycles left become fewer."
-POSITIONING = "Positioning on the page of the cell: target, what remains, and the tap that comes next."
-KNOWN_BATCH = "Trend of the cell: a mark where the batch begins; its offset is learned within some cycles."
-UNKNOWN_BATCH = "Alarms: “Batch shift” comes by itself, with its evidence. Acknowledge it, with a comment."
-DEVIATION = (
-    "Friction along the stroke: the dashed curve and the place where it deviates; alarm “Deviant cycle”."
+WEAR = Message(
+    "Trend of the cell: the level rises towards the dashed limit, and the cycles left become fewer.",
+    "Verlauf der Zelle: der Verschleiß steigt zur gestrichelten Grenze, es bleiben immer weniger Zyklen.",
 )
-APPEARANCE = (
+POSITIONING = Message(
+    "Positioning on the page of the cell: target, what remains, and the tap that comes next.",
+    "Positionieren auf der Seite der Zelle: Ziel, was noch fehlt, und der nächste Stoß.",
+)
+KNOWN_BATCH = Message(
+    "Trend of the cell: a mark where the batch begins; its offset is learned within some cycles.",
+    "Verlauf der Zelle: ein Strich, wo die Charge beginnt; ihr Versatz ist in einigen Zyklen gelernt.",
+)
+UNKNOWN_BATCH = Message(
+    "Alarms: “Batch shift” comes by itself, with its evidence. Acknowledge it, with a comment.",
+    "Alarme: „Chargenwechsel“ kommt von selbst, mit seinem Nachweis. Quittieren Sie ihn, mit Kommentar.",
+)
+DEVIATION = Message(
+    "Friction along the stroke: the dashed curve and the place where it deviates; alarm “Deviant cycle”.",
+    "Reibung entlang des Hubs: die gestrichelte Kurve und die Stelle, wo sie abweicht; Alarm „Abweichender "
+    "Zyklus“.",
+)
+APPEARANCE = Message(
     "Model and gap: the gap rises above 1 and the alarm “Model gap” comes. Then the workflow names the "
-    "effect, the extended model goes into service by itself, and the gap closes."
+    "effect, the extended model goes into service by itself, and the gap closes.",
+    "Modell und Abweichung: sie steigt über 1, und der Alarm „Modelllücke“ kommt. Dann nennt der Ablauf "
+    "den Effekt, das erweiterte Modell geht von selbst in Betrieb, und die Abweichung schließt sich.",
 )
-MEASUREMENTS = "Measurements: drop a CSV of your own there; it is read, studied and compared with this cell."
+MEASUREMENTS = Message(
+    "Measurements: drop a CSV of your own there; it is read, studied and compared with this cell.",
+    "Messungen: legen Sie dort eine eigene CSV ab; sie wird gelesen, untersucht und mit dieser Zelle "
+    "verglichen.",
+)
+KINDS = {
+    "bump": "eine Erhebung",
+    "level": "eine andere Höhe",
+    "tilt": "eine Neigung",
+    "ripple": "eine Welligkeit",
+}
+"""Kinds of deviations in German."""
 
 
 def tour(content: Mapping[str, Any]) -> tuple[TourStop, ...]:
     """List what a scenario has in store, in its order."""
-    stops = [TourStop(1, "The surface wears: µs grows slowly.", WEAR)] if content.get("wear") else []
+    wears = Message("The surface wears: µs grows slowly.", "Die Oberfläche verschleißt: µs wächst langsam.")
+    stops = [TourStop(1, wears, WEAR)] if content.get("wear") else []
     if content.get("positioning"):
-        stops.append(
-            TourStop(1, "Parts come one after the other and are tapped to their targets.", POSITIONING)
+        placed = Message(
+            "Parts come one after the other and are tapped to their targets.",
+            "Teile kommen eins nach dem anderen und werden an ihre Ziele gestoßen.",
         )
+        stops.append(TourStop(1, placed, POSITIONING))
     for batch in content.get("batches", []):
         if batch["from_cycle"] > 1:
             is_told = batch.get("announced", True)
-            what = (
-                f"Batch {batch['id']} is on the table{'' if is_told else ', and the PLC says nothing of it'}."
+            english, german = (
+                f"Batch {batch['id']} is on the table",
+                f"Charge {batch['id']} liegt auf dem Tisch",
             )
+            what = Message(f"{english}.", f"{german}.")
+            if not is_told:
+                what = Message(
+                    f"{english}, and the PLC says nothing of it.", f"{german}, und die SPS sagt nichts davon."
+                )
             stops.append(TourStop(batch["from_cycle"], what, KNOWN_BATCH if is_told else UNKNOWN_BATCH))
     for deviation in content.get("deviations", []):
-        what = f"One cycle is odd: a {deviation['kind']} along its stroke."
+        kind = deviation["kind"]
+        what = Message(
+            f"One cycle is odd: a {kind} along its stroke.",
+            f"Ein Zyklus ist anders: {KINDS[kind]} entlang seines Hubs.",
+        )
         stops.append(TourStop(deviation["cycle"], what, DEVIATION))
     for entry in content.get("appearances", []):
-        names = ", ".join(entry["effects"]).replace("_", " ")
-        stops.append(TourStop(entry["from_cycle"], f"A new effect acts in the plant: {names}.", APPEARANCE))
+        what = Message(
+            f"A new effect acts in the plant: {', '.join(entry['effects']).replace('_', ' ')}.",
+            f"Ein neuer Effekt wirkt: {', '.join(map(german_effect, entry['effects']))}.",
+        )
+        stops.append(TourStop(entry["from_cycle"], what, APPEARANCE))
     last = max((stop.cycle for stop in stops), default=1)
-    return (*sorted(stops, key=lambda stop: stop.cycle), TourStop(last, "Your turn.", MEASUREMENTS))
+    yours = Message("Your turn.", "Jetzt Sie.")
+    return (*sorted(stops, key=lambda stop: stop.cycle), TourStop(last, yours, MEASUREMENTS))

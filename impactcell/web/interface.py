@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Protocol
 from urllib.parse import urlsplit
 
+from impactcell.alarms import Message
 from impactcell.records import Alarm, Capture, ModuleStatus, Snapshot
 from impactcell.scada import Actor, ConditionAction
 
@@ -39,8 +40,8 @@ class TourStop:
     """Something that a demo has in store: from which cycle on, what happens, and where to look."""
 
     cycle: int
-    what: str
-    where: str
+    what: Message
+    where: Message
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ LATER: Mapping[str, str] = {
         r"discrepancy\.search\.(conclusion|convergence|dominance|held_out|model_error|open_loop)"
         r"|discrepancy\.report\.sentences"
     ),
-    "reports in German": r"german(\..*)?|discrepancy\.report\.german_sentences",
+    "reports in German": r"german(\..*)?|discrepancy\.report\.german_\w+",
     "effects of the user's own": r"physics\.(outside_effects|effect_contract)|cli\.(effects|cluster)",
     "a public API": r"api(\..*)?",
     "a cell from nothing: init, a first model, judgement": r"cli\.(init|first_model)|settings\.judgement",

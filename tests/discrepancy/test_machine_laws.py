@@ -127,7 +127,7 @@ def test_law_is_a_base_model_again_and_leaves_nothing(tmp_path: Path) -> None:
     assert_is_the_same_in_german(page, german)
     assert "-s(q) sign(q&#39;) mit s(u) = " in german
     assert result["headline"].endswith(
-        f"falls to {law['held_out']['after']:.2f}: a law that nobody had listed."
+        f"gap to {law['held_out']['after']:.2f}: a law that nobody had listed."
     )
     again = CliRunner().invoke(
         app, [*command, str(tmp_path / "again"), "--base", str(tmp_path / "found" / law["file"])]

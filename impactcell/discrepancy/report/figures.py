@@ -7,7 +7,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import ScalarFormatter
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from impactcell.discrepancy.data import BETWEEN_SHOTS, CHANNELS
 from impactcell.discrepancy.search import ALL, ModelEvidence
@@ -224,6 +224,7 @@ def factor_figure(result: DiscrepancyResult, said: ModuleType) -> str:
         axes.axhline(0.0, color="#8a97a3", linewidth=0.8)
         low, high = axes.get_ylim()
         axes.set_ylim(min(low, -FACTOR_SCALE_PERCENT), max(high, FACTOR_SCALE_PERCENT))
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.set_xlabel(said.label("shot, in order"))
         axes.set_ylabel(said.label("friction factor [%]"))
         axes.legend(frameon=False, fontsize=8, ncols=4, loc="lower left", bbox_to_anchor=(0.0, 1.0))

@@ -62,7 +62,7 @@ def headline(finding: MachineFinding) -> str:
             said += " Etwas bleibt, das es nicht erklärt."
     if finding.law is not None:
         said += (
-            f" Mit {equation(law_equation(finding.law))} fällt die Abweichung auf "
+            f" {equation(law_equation(finding.law))}, bringt die Abweichung auf "
             f"{finding.law.fall.after:.2f}: ein Gesetz, das keine Liste hatte."
         )
     return written(said)

@@ -19,7 +19,7 @@ def headline(finding: MachineFinding) -> str:
     if law is None:
         return _conclusion(finding)
     return (
-        f"{_conclusion(finding)} With {law_equation(law)} the held-out gap falls to {law.fall.after:.2f}: "
+        f"{_conclusion(finding)} {law_equation(law)}, takes the held-out gap to {law.fall.after:.2f}: "
         "a law that nobody had listed."
     )
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from impactcell.alarms import Message
 from impactcell.demo.scenario_setup import CONFIG, SCENARIOS, story
 from impactcell.demo.tour import tour
 from impactcell.process.shipped import ROOT, shipped_config
@@ -20,17 +21,24 @@ def test_what_happens_is_told_with_where_to_look(scenario: str) -> None:
     stops = tour(content)
     assert sorted(stop.cycle for stop in stops[:-1]) == sorted(cycle for cycle, _ in story(content))
     assert [stop.cycle for stop in stops] == sorted(stop.cycle for stop in stops)
-    assert all(stop.what and stop.where for stop in stops)
+    for stop in stops:
+        for said in (stop.what, stop.where):
+            assert said.english
+            assert said.german not in ("", said.english)
 
 
 async def test_the_page_gives_the_tour(tmp_path: Path) -> None:
-    stop = TourStop(7, "It <happens>.", "There.")
+    stop = TourStop(7, Message("It <happens>.", "Es <geschieht>."), Message("There.", "Dort."))
     page = make_page(tmp_path, tour=(stop,))
     async with page.logged_in(Role.OBSERVER) as client:
         for path in ("/", f"/cells/{CELL}"):
             text = (await client.get(path)).text
             assert 'data-cycle-from="7"' in text
             assert "It &lt;happens&gt;." in text
+            text = (await client.get(f"{path}?lang=de")).text
+            assert "<b>Es &lt;geschieht&gt;.</b>" in text
+            assert ">Dort.<" in text
+            await client.get(f"{path}?lang=en")
     await asyncio.sleep(0)
 
 

@@ -138,6 +138,14 @@ def test_nothing_known_is_drawn_as_such() -> None:
     assert "by none" not in text
 
 
+def test_a_limit_that_was_passed_is_said_to_be() -> None:
+    (snapshot,) = history(1)
+    there = replace(snapshot.wear, limit=0.24, cycles_to_limit=0.0, cycles_to_limit_low=0.0)
+    assert "0.240, passed" in drawn([replace(snapshot, wear=there)])
+    soon = replace(there, cycles_to_limit=12.0, cycles_to_limit_low=8.0, cycles_to_limit_high=19.0)
+    assert "0.240 in 12 (8 to 19) cycles" in drawn([replace(snapshot, wear=soon)])
+
+
 def test_before_the_first_cycle_it_says_how_long_and_what_is_waited_for() -> None:
     console = Console(width=100, file=io.StringIO(), record=True)
     console.print(render(Scene("press-1", "", "", [], "not connected", waited_s=34.2)))

@@ -1,6 +1,7 @@
 """Who may see and do what on the page: every address, every role, and all that must be refused."""
 
 import asyncio
+import math
 from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
@@ -330,6 +331,17 @@ async def test_a_probability_is_said_to_be_one(
         for language, said in (("en", english), ("de", german)):
             text = (await client.get(f"/alarms?lang={language}")).text
             assert f"500. {said}</p>" in text
+
+
+async def test_the_evidence_of_an_alarm_is_one_row_of_facts(page: Page) -> None:
+    whole = Evidence(12.25, 11.0, change_cycle=70, size=0.0903, size_std=0.0028)
+    for evidence, said in (
+        (whole, "Evidence 12.2, alarm above 11, since cycle 70, size 0.0903 ± 0.0056"),
+        (replace(whole, statistic=math.nan), "since cycle 70, size 0.0903 ± 0.0056"),
+    ):
+        await put(page, CellNews(CELL, alarms=(replace(raised(evidence=evidence), name="DeviantCycle"),)))
+        async with page.logged_in(Role.OBSERVER) as client:
+            assert f"500. {said}</p>" in (await client.get("/alarms?lang=en")).text
 
 
 @pytest.mark.parametrize("path", ["/", "/alarms", "/studies", "/system", "/nothing"])
