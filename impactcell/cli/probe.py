@@ -14,6 +14,7 @@ from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.probe import ProbeResult
 from impactcell.fieldbus.probe import probe as probe_module
 from impactcell.fieldbus.transports import transport_for
+from impactcell.prediction.mass_interpolation import velocity_range_m_s
 from impactcell.process.console import print_result
 from impactcell.records import Capture, Channel
 from impactcell.service.factory import module_link
@@ -21,6 +22,9 @@ from impactcell.settings import CellConfig, read_cell
 
 ROUNDING: Final = 1e-3
 """Share by which the steps of a register may lead out of a range at whose edge the value is."""
+UNIT_FACTOR: Final = 3.0
+"""Factor beside a calibrated range from which on a wrong unit or scale is likelier than another tap: mm/min
+and mm/s are 60 apart."""
 
 
 def probe(cell: Path) -> None:
@@ -102,16 +106,18 @@ def _unlike(cell: CellConfig, capture: Capture) -> Iterator[str]:
     predictors = cell.model.predictors
     if not predictors:
         return
-    slowest, fastest = (6e4 * velocity for velocity in predictors[0].velocity_range_m_s)
+    mass_kg = capture.mass_kg if math.isfinite(capture.mass_kg) else predictors[0].mass_kg
+    slowest, fastest = (6e4 * velocity for velocity in velocity_range_m_s(cell.model, mass_kg))
     for name, value, low, high, unit in (
         ("velocity", 6e4 * abs(capture.velocity_m_s), slowest, fastest, "mm/min"),
         ("mass", capture.mass_kg, predictors[0].mass_kg, predictors[-1].mass_kg, "kg"),
     ):
         if math.isfinite(value) and not low * (1.0 - ROUNDING) <= value <= high * (1.0 + ROUNDING):
+            is_far = not low / UNIT_FACTOR <= value <= high * UNIT_FACTOR
+            what = f"see unit and scale of {name} in the map, or calibrate" if is_far else "calibrate for it"
             yield (
                 f"{name} {value:.6g} {unit} is not within the {low:.4g} to {high:.4g} {unit} that "
-                f"model '{cell.model.name}' is calibrated for: see unit and scale of {name} in the "
-                "map, or calibrate"
+                f"model '{cell.model.name}' is calibrated for: {what}"
             )
 
 

@@ -139,8 +139,7 @@ def out_of_range(
     if not mixed.inside:
         low, high = model.predictors[0].mass_kg, model.predictors[-1].mass_kg
         reasons.append(f"mass {mixed.mass_kg:.4g} kg is outside the calibrated {low:.4g}-{high:.4g} kg")
-    slowest = max(predictor.velocity_range_m_s[0] for _, predictor in mixed.parts)
-    fastest = min(predictor.velocity_range_m_s[1] for _, predictor in mixed.parts)
+    slowest, fastest = mixed.velocity_range_m_s
     if not slowest * (1 - 1e-9) <= velocity_m_s <= fastest * (1 + 1e-9):
         reasons.append(
             f"velocity {6e4 * velocity_m_s:.5g} mm/min is outside the calibrated "

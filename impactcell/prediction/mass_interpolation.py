@@ -36,6 +36,12 @@ class MassInterpolation:
             sum(share * math.log(slope) for (share, _), slope in zip(self.parts, slopes, strict=True))
         )
 
+    @property
+    def velocity_range_m_s(self) -> tuple[float, float]:
+        """Velocities that it is calibrated for."""
+        slowest, fastest = zip(*(predictor.velocity_range_m_s for _, predictor in self.parts), strict=True)
+        return max(slowest), min(fastest)
+
     def peak_force(self, mu_s: float, velocity_m_s: float) -> float:
         """Equation (4) forward, N."""
         return self.friction_n * mu_s + self.velocity_n_s_per_m * velocity_m_s
@@ -95,6 +101,13 @@ def interpolate_mass(model: Model, mass_kg: float, velocity_m_s: float) -> MassI
             )
             return MassInterpolation(mass_kg, parts, inside=True)
     return MassInterpolation(mass_kg, ((1.0, _for_velocity(model, close, velocity_m_s)),), inside=False)
+
+
+def velocity_range_m_s(model: Model, mass_kg: float) -> tuple[float, float]:
+    """Velocities that a mass is calibrated for, in whatever regime."""
+    most = max(predictor.velocity_range_m_s[1] for predictor in model.predictors)
+    slow, fast = (interpolate_mass(model, mass_kg, velocity) for velocity in (0.0, most))
+    return slow.velocity_range_m_s[0], fast.velocity_range_m_s[1]
 
 
 def _for_velocity(model: Model, mass_kg: float, velocity_m_s: float) -> Predictor:

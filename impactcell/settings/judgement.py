@@ -14,6 +14,7 @@ from impactcell.features import noise_std
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.map_registers import unknown_names
 from impactcell.journal.store import Journal
+from impactcell.prediction.mass_interpolation import velocity_range_m_s
 from impactcell.process import yaml_loader
 from impactcell.process.yaml_loader import FilePosition
 from impactcell.settings.cells import CellConfig
@@ -129,8 +130,8 @@ def _of_predictors(cell: CellConfig, calibrate: str) -> Iterator[_Remark]:
             f"uncertain; {calibrate}",
             is_fault=False,
         )
-    slowest, fastest = predictors[0].velocity_range_m_s
     limit = settings.actuator.max_velocity_mm_per_min
+    slowest, fastest = velocity_range_m_s(cell.model, mass_kg or lightest)
     if limit < slowest * 60e3 * (1.0 - 1e-9):
         yield _Remark(
             ("actuator", "max_velocity_mm_per_min"),

@@ -56,7 +56,7 @@ async def test_what_is_wrong_is_named(tmp_path: Path, change: dict[str, object],
 @pytest.mark.parametrize(
     ("name", "unit", "wrong", "told"),
     [
-        ("velocity", "mm/min", "mm/s", "velocity 252000 mm/min is not within the 2400 to 6000 mm/min"),
+        ("velocity", "mm/min", "mm/s", "velocity 252000 mm/min is not within the 2000 to 6000 mm/min"),
         ("mass", "kg", "g", "mass 0.0189 kg is not within the "),
     ],
 )
@@ -75,6 +75,17 @@ async def test_a_wrong_unit_of_what_the_model_knows_is_named(
     assert f"look at     {told}" in out
     assert f"see unit and scale of {name} in the map" in out
     assert out.count("look at") == 1
+
+
+async def test_a_tap_beside_the_calibration_of_its_mass_is_blamed_on_no_unit(tmp_path: Path) -> None:
+    strikes = {"period_s": 0.1, "cycles": 1, "velocities_mm_per_min": [1900.0]}
+    async with simulator(tmp_path, strikes=strikes) as module:
+        cell = write_cell(tmp_path, module["port"])
+        while "tap         cycle 1" not in (out := (await probed(cell))[1]):
+            pass
+    assert "look at     velocity 1900 mm/min is not within the 2000 to 6000 mm/min" in out
+    assert "calibrate for it" in out
+    assert "see unit" not in out
 
 
 async def test_a_wrong_scale_is_named_beside_the_tap(tmp_path: Path) -> None:
