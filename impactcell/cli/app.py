@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from impactcell.cli.access_verbs import certs, users
+from impactcell.cli.import_verb import import_files
 from impactcell.cli.model_verbs import model
 from impactcell.cli.options import AsJson, Cell, Cells, Directory, OptionalCell, verb
 from impactcell.numerics.compilation import on_compilation
@@ -155,46 +156,7 @@ def estimate(
     run_estimate(campaign, cell, output, as_json=as_json)
 
 
-@verb(app, "import")
-def import_files(
-    files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="Measurement files, a shot or many each.")
-    ],
-    *,
-    output: Annotated[
-        Path | None,
-        typer.Option("-o", "--output", "--out", metavar="CAMPAIGN", help="Campaign directory to write."),
-    ] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what is guessed.")] = False,
-    column: Annotated[
-        list[str] | None,
-        typer.Option(metavar="QUANTITY=NAME", help="Which column is the force, say: force=Kraft."),
-    ] = None,
-    unit: Annotated[list[str] | None, typer.Option(metavar="NAME=UNIT", help="Unit of a column.")] = None,
-    sign: Annotated[list[str] | None, typer.Option(metavar="QUANTITY=+1|-1", help="Turn a channel.")] = None,
-    constant: Annotated[
-        list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="For all shots: mass=18.9kg, say.")
-    ] = None,
-    mapping: Annotated[
-        Path | None,
-        typer.Option(metavar="MAP.yaml", help="Says the same in blocks columns, units, signs, constants."),
-    ] = None,
-    excitation: Annotated[str | None, typer.Option(help="tap, free_slide or driven.")] = None,
-    trigger: Annotated[
-        str | None, typer.Option(help="Force at which contact begins, as '5 N'; none: t = 0 is the contact.")
-    ] = None,
-    delimiter: Annotated[str | None, typer.Option(help="Of a text file; tab and space by name.")] = None,
-    decimal: Annotated[str | None, typer.Option(help="Of a text file: point or comma.")] = None,
-    encoding: Annotated[str | None, typer.Option(help="Of a text file.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print what was guessed as JSON.")] = False,
-) -> None:
-    """Make a campaign of measurement files; what is guessed of columns, units and shots is shown."""
-    from impactcell.cli.import_files import ImportOptions, named_dialect
-    from impactcell.cli.import_files import import_files as run_import
-
-    said = {"columns": column or (), "units": unit or (), "signs": sign or (), "constants": constant or ()}
-    options = ImportOptions(said, mapping, named_dialect(delimiter, decimal, encoding), excitation, trigger)
-    run_import(files, output, options, dry_run=dry_run, as_json=as_json)
+verb(app, "import")(import_files)
 
 
 @verb(app)

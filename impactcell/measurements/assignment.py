@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from impactcell.measurements.gains import SIGNALS
 from impactcell.measurements.recognition import CHANNELS, VOCABULARY, WORD_MATCH, ColumnMeaning, name_score
 from impactcell.measurements.sampling_step import sampling_step_s
 from impactcell.measurements.table import Table
@@ -85,12 +86,27 @@ def _of_column(item: Assignment) -> list[str]:
             f"column {item.column!r} ({item.meaning}) has no unit; say --unit '{item.column}="
             f"{VOCABULARY[item.meaning].dimensions[0].value}', or which it is"
         )
+    elif item.unit.dimension not in VOCABULARY[item.meaning].dimensions:
+        faults.append(
+            f"column {item.column!r} ({item.meaning}) is in {item.unit.symbol}; "
+            f"{_way_to_unit(item, item.meaning, item.unit)}"
+        )
     if item.confidence < SURE and item.meaning in (ColumnMeaning.TIME, *CHANNELS):
         faults.append(
             f"column {item.column!r} may be the {item.meaning} ({item.why}); confirm it with --column "
             f"'{item.meaning}={item.column}', or name the right one"
         )
     return faults
+
+
+def _way_to_unit(item: Assignment, meaning: ColumnMeaning, unit: MeasuredUnit) -> str:
+    """Say how a column that is in a unit of something else can be used as a quantity."""
+    fitting = VOCABULARY[meaning].dimensions[0].value
+    way = f"give its unit with --unit '{item.column}={fitting}'"
+    if meaning not in CHANNELS or unit.dimension not in SIGNALS:
+        return way
+    signal = "" if unit.dimension is Dimension.NONE else f"/{unit.symbol}"
+    return f"say what that stands for with --gain '{meaning}=12.5 {fitting}{signal}', or {way}"
 
 
 def _contradictions(assignments: Sequence[Assignment]) -> list[str]:
@@ -107,8 +123,8 @@ def _contradictions(assignments: Sequence[Assignment]) -> list[str]:
             if meaning in present and item.meaning is ColumnMeaning.COVARIATE:
                 continue  # another column is that channel, so this is one more, of whatever
             faults.append(
-                f"column {item.column!r} is called as the {meaning}, but is in {item.unit.symbol}; give "
-                f"its unit with --unit '{item.column}={dimensions[0].value}', or what it is with --column "
+                f"column {item.column!r} is called as the {meaning}, but is in {item.unit.symbol}; "
+                f"{_way_to_unit(item, meaning, item.unit)}, or what it is with --column "
                 f"'covariate={item.column}'"
             )
     return faults

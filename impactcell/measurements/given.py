@@ -7,9 +7,10 @@ from pathlib import Path
 
 from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError, SettingsError
+from impactcell.measurements.gains import Gain, parse_gain
 from impactcell.measurements.mapping import Given
 from impactcell.measurements.numbers import parse_number
-from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
+from impactcell.measurements.recognition import CHANNELS, VOCABULARY, ColumnMeaning
 from impactcell.measurements.taps import NO_TRIGGER
 from impactcell.measurements.units import Dimension, parse_unit
 from impactcell.process import yaml_loader
@@ -28,7 +29,7 @@ NAMES = {"rate": "rate_hz"}
 """Names of constants that carry their unit."""
 OTHERS = (ColumnMeaning.COVARIATE, ColumnMeaning.IGNORED)
 """What several columns can be: said once for each, or as a list in a file."""
-SECTIONS = ("columns", "units", "signs", "constants")
+SECTIONS = ("columns", "units", "gains", "signs", "constants")
 """Blocks of a mapping file; beside them `excitation` and `trigger`."""
 
 
@@ -71,6 +72,11 @@ def read_given(
             for key, text in sections.get("constants", {}).items()
         },
         others,
+        {
+            q: gain
+            for key, text in sections.get("gains", {}).items()
+            if (q := _quantity(key, faults)) and (gain := _gain(q, text, faults))
+        },
     )
     if faults:
         raise MeasurementError("\n".join(faults))
@@ -134,6 +140,21 @@ def _sign(key: str, text: str, faults: list[str]) -> int:
         return int(text)
     faults.append(f"the sign of {key} is {text!r}; it has to be 1 or -1")
     return 1
+
+
+def _gain(quantity: ColumnMeaning, text: str, faults: list[str]) -> Gain | None:
+    if quantity not in CHANNELS:
+        faults.append(f"{quantity} has no gain; one is of {', '.join(CHANNELS)}")
+        return None
+    dimensions = VOCABULARY[quantity].dimensions
+    gain = parse_gain(text, dimensions)
+    if gain is None:
+        unit = dimensions[0].value
+        faults.append(
+            f"the gain of {quantity} is {text!r}; write it with its units, as {quantity}=12.5 {unit}/V or "
+            f"{quantity}=80 mV/{unit}, or {quantity}=0.01 {unit} for one count of a converter"
+        )
+    return gain
 
 
 def _excitation(text: str | None, faults: list[str]) -> Excitation | None:

@@ -9,6 +9,7 @@ import numpy as np
 from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError
 from impactcell.measurements.assignment import SURE, Assignment, ascends, lacking
+from impactcell.measurements.gains import Gain
 from impactcell.measurements.recognition import (
     UNIT_ALONE,
     UNIT_MATCH,
@@ -48,6 +49,8 @@ class Given:
         Mass, velocity, direction, stroke, rate and gravity of all shots, in SI units, by their names.
     others : mapping
         Columns that are covariates or ignored, by their names.
+    gains : mapping
+        What the signal in the column of a channel stands for.
     """
 
     columns: AbstractMapping[ColumnMeaning, str] = field(default_factory=dict)
@@ -57,6 +60,7 @@ class Given:
     trigger: float | str | None = None
     constants: AbstractMapping[str, float] = field(default_factory=dict)
     others: AbstractMapping[str, ColumnMeaning] = field(default_factory=dict)
+    gains: AbstractMapping[ColumnMeaning, Gain] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +122,7 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
             chosen[item.column] = quantities[item.meaning] = item
     assignments = tuple(chosen.get(name) or _further(column, given) for name, column in columns.items())
     faults = [*lacking(assignments, given.constants, tables), *_without_use(assignments, given, tables)]
+    faults += [*_unused_gains(assignments, given, columns), *_contrary_units(tables, given)]
     return Mapping(assignments, given, tuple(faults))
 
 
@@ -136,6 +141,47 @@ def _without_use(assignments: Sequence[Assignment], given: Given, tables: Sequen
             f"the times are those of column {time!r}, so that the rate has no use; take the rate away, or "
             f"say --column 'ignored={time}' for it to count"
         )
+    return faults
+
+
+def _contrary_units(tables: Sequence[Table], given: Given) -> list[str]:
+    """Tell columns of one name that are in one unit in one table and in another in the next."""
+    first: dict[str, tuple[str, str]] = {}
+    faults: dict[str, str] = {}
+    for table in tables:
+        for column in table.columns:
+            unit = parse_unit(column.unit) if column.unit is not None else None
+            if column.unit is None or unit is None or column.name in given.units:
+                continue
+            title, text = first.setdefault(column.name, (table.title, column.unit))
+            before = parse_unit(text)
+            if before is not None and replace(before, symbol=unit.symbol) != unit:
+                faults.setdefault(
+                    column.name,
+                    f"column {column.name!r} is in {text} in {title} and in {column.unit} in {table.title}; "
+                    f"import the files one by one, or say the unit of all with --unit '{column.name}={text}'",
+                )
+    return list(faults.values())
+
+
+def _unused_gains(
+    assignments: Sequence[Assignment], given: Given, columns: AbstractMapping[str, MeasuredColumn]
+) -> list[str]:
+    """Tell gains of what is no column, or of one that is in no unit of their signal."""
+    names = {item.meaning: item.column for item in assignments}
+    faults = []
+    for meaning, gain in given.gains.items():
+        name = names.get(meaning)
+        if name is None:
+            faults.append(
+                f"a gain of the {meaning} was given, and no column is the {meaning}; name it with --column "
+                f"{meaning}=NAME, or take the gain away"
+            )
+        elif (unit := _unit_of(columns[name], given)) and gain.measured(unit) is None:
+            faults.append(
+                f"column {name!r} ({meaning}) is in {unit.symbol}, of which a gain of {gain.text} says "
+                f"nothing; take it away, or say --unit '{name}={gain.signal.symbol}'"
+            )
     return faults
 
 
@@ -166,6 +212,12 @@ def _unit_of(column: MeasuredColumn, given: Given) -> MeasuredUnit | None:
     return None if text is None else parse_unit(text)
 
 
+def _measured(unit: MeasuredUnit | None, meaning: ColumnMeaning, given: Given) -> MeasuredUnit | None:
+    """Give the unit of what is measured, where a gain says what the signal in a column stands for."""
+    gain = given.gains.get(meaning)
+    return unit if gain is None else gain.measured(unit) or unit
+
+
 def _candidates(column: MeasuredColumn, given: Given, columns: Sequence[MeasuredColumn]) -> list[Assignment]:
     """Whatever a column could be, with how sure it is."""
     unit = _unit_of(column, given)
@@ -173,14 +225,15 @@ def _candidates(column: MeasuredColumn, given: Given, columns: Sequence[Measured
         return []
     named = [meaning for meaning, name in given.columns.items() if name == column.name]
     if named:
-        return [Assignment(column.name, named[0], unit, GIVEN, "given")]
+        return [Assignment(column.name, named[0], _measured(unit, named[0], given), GIVEN, "given")]
     found = []
     for meaning in PRIORITY:
         if meaning in given.columns:
             continue
-        score, why = _score(column, meaning, unit, columns, given)
+        measured = _measured(unit, meaning, given)
+        score, why = _score(column, meaning, measured, columns, given)
         if score > 0.0:
-            found.append(Assignment(column.name, meaning, unit, score, why))
+            found.append(Assignment(column.name, meaning, measured, score, why))
     return found
 
 

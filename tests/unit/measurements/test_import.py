@@ -352,3 +352,81 @@ def test_what_rotates_is_a_campaign_of_torque_angle_and_inertia(tmp_path: Path) 
     yaml.write_text(yaml.read_text(encoding="utf-8").replace("rotation", "spin"), encoding="utf-8")
     with pytest.raises(CampaignError, match=r"campaign\.yaml:4: coordinate 'spin' is not known"):
         campaign.read(tmp_path / "c")
+
+
+VOLTS = {"mass": 18.9, "velocity": 0.05}
+"""Constants of a tap whose force was recorded in volts, 12.5 N each."""
+
+
+def volts(unit: str | None = "V", name: str = "Kraft", factor: float = 12.5) -> list[Table]:
+    time, force, position = sampled(taps((3000,), (18.9,))[0], np.random.default_rng(9))
+    return [table(**{"Zeit": ("s", time), name: (unit, force / factor), "Weg": ("m", position)})]
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "gain"),
+    [
+        ("V", 12.5, "12.5 N/V"),
+        ("V", 12.5, "80 mV/N"),
+        ("mV", 0.0125, "12.5N/V"),
+        (None, 12.5, "12.5 N/V"),
+        ("mA", 40.0, "0.04 kN/mA"),
+        (None, 0.5, "0.5 N"),
+        ("V", -12.5, "-12.5 N/V"),
+    ],
+)
+def test_a_force_in_volts_is_one_in_newtons_with_its_gain(
+    unit: str | None, factor: float, gain: str, tmp_path: Path
+) -> None:
+    said = tmp_path / "map.yaml"
+    said.write_text(f"gains: {{force: {gain}}}\n", encoding="utf-8")
+    tables = volts(unit, factor=factor)
+    (plain,) = make_campaign(volts("N", factor=1.0), guess(volts("N"), Given(constants=VOLTS))).campaign.shots
+    for given in (read_given({"gains": [f"force={gain}"]}), read_given({}, said)):
+        mapping = guess(tables, replace(given, constants=VOLTS))
+        assert mapping.faults == ()
+        (shot,) = make_campaign(tables, mapping).campaign.shots
+        assert shot.force is not None
+        assert plain.force is not None
+        np.testing.assert_allclose(shot.force.values, plain.force.values, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("said", "unit", "told"),
+    [
+        (
+            {},
+            "V",
+            "is called as the force, but is in V; say what that stands for with --gain 'force=12.5 N/V'",
+        ),
+        ({"columns": ["force=Kraft"]}, "V", "'Kraft' (force) is in V; say what that stands for with --gain"),
+        ({"units": ["Kraft=V"]}, "N", "is called as the force, but is in V; say what that stands for with"),
+        ({"units": ["Kraft=1"]}, "N", "(force) is in 1; say what that stands for with --gain 'force=12.5 N'"),
+        ({"columns": ["force=Kraft"], "units": ["Kraft=bar"]}, "N", "(force) is in bar; give its unit with"),
+        ({"gains": ["force=12.5 N/V"]}, "N", "(force) is in N, of which a gain of 12.5 N/V says nothing"),
+        ({"gains": ["actuator=2 mm/V"]}, "N", "a gain of the actuator was given, and no column is the actu"),
+    ],
+)
+def test_a_signal_without_its_gain_is_refused(said: dict[str, list[str]], unit: str, told: str) -> None:
+    tables = volts(unit)
+    mapping = guess(tables, replace(read_given(said), constants=VOLTS))
+    with pytest.raises(MeasurementError, match=re.escape(told)):
+        make_campaign(tables, mapping)
+
+
+@pytest.mark.parametrize("gain", ["force=12.5", "force=0 N/V", "force=2 mm/V", "force=N/V", "force=2 mV/V/N"])
+def test_a_gain_that_is_none_is_told(gain: str) -> None:
+    with pytest.raises(MeasurementError, match=r"the gain of force is .* write it with its units"):
+        read_given({"gains": [gain]})
+    with pytest.raises(MeasurementError, match="mass has no gain; one is of force, position, actuator"):
+        read_given({"gains": ["mass=2 kg/V"]})
+
+
+def test_one_column_in_two_units_is_refused_unless_one_was_given() -> None:
+    tables = [*volts("N"), replace(volts("kN")[0], source="b.csv")]
+    with pytest.raises(
+        MeasurementError, match=re.escape("column 'Kraft' is in N in a.csv and in kN in b.csv")
+    ):
+        make_campaign(tables, guess(tables, Given(constants=VOLTS)))
+    given = Given(constants=VOLTS, units={"Kraft": "N"})
+    assert len(make_campaign(tables, guess(tables, given)).campaign.shots) == 2
