@@ -9,8 +9,11 @@ from impactcell.campaign.faults import Faults
 from impactcell.campaign.header import Header, read_header
 from impactcell.campaign.shots import ShotRow, read_shots
 from impactcell.campaign.trace import read_trace
+from impactcell.numerics.raster import raster_of
 from impactcell.records import Capture, Channel
 
+FINE_RASTER = 0.1
+"""Step of a raster over the stated noise up to which rounding adds nothing to it: less than 0.05 %."""
 REQUIRED_CHANNELS = {
     Excitation.TAP: ({"force", "position"}, "force_n or position_m"),
     Excitation.FREE_SLIDE: ({"position"}, "position_m"),
@@ -123,7 +126,10 @@ def _capture(file: Path, shot: ShotRow, header: Header | None, faults: Faults) -
         if sensor not in channels:
             return None
         time, values = channels[sensor]
-        return Channel(time, values, header.sensors.get(sensor, Sensor()).noise_std)
+        noise_std = header.sensors.get(sensor, Sensor()).noise_std
+        raster = raster_of(values)
+        is_coarse = raster is not None and raster > FINE_RASTER * (noise_std or 0.0)
+        return Channel(time, values, noise_std, resolution=raster if is_coarse else None)
 
     return Capture(
         cycle=shot.number,

@@ -10,6 +10,7 @@ import numpy as np
 
 from impactcell.errors import CaptureError, ClippedForceError, NoSeparationError
 from impactcell.features.channels import CheckedForce, smoothing_width
+from impactcell.features.clipping import is_cut_off
 from impactcell.features.measured import MeasuredFeature
 from impactcell.numerics.local_polynomial import fit_polynomial, median, value_std, widest_cubic
 from impactcell.records import Samples
@@ -73,7 +74,7 @@ def refuse_clipped(force: CheckedForce) -> None:
     if force.full_scale is not None and force.highest >= force.full_scale[1]:
         count = int((force.values >= force.full_scale[1]).sum())
         raise ClippedForceError(f"{count} force samples are at full scale, {force.full_scale[1]:.6g} N")
-    if force.plateau >= MIN_CLIPPED_RUN and (force.resolution or 0.0) < 2.0 * (force.noise_std or 0.0):
+    if force.plateau >= MIN_CLIPPED_RUN and is_cut_off(force.values, force.plateau):
         raise ClippedForceError(
             f"{force.plateau} force samples in a row stand at {force.highest:.6g} N: clipped"
         )

@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from impactcell.campaign.contacts import noise_of
+from impactcell.features import white_noise_std
+from impactcell.features.clipping import is_cut_off
+from impactcell.numerics.raster import raster_of
 from impactcell.quality.data_fault import DataFault, Fault
 from impactcell.records import Channel, Samples
 
@@ -75,13 +78,20 @@ def _plateaus(name: str, channel: Channel, shot: int) -> list[DataFault]:
     if name == "actuator" or noise_of(values) == 0.0:
         return []  # an actuator halts, and without noise rest is a plateau
     starts, lengths = _equal_runs(values)
+    is_coarse = (raster_of(values) or 0.0) > white_noise_std(values)  # there, too
+    if is_coarse and name != "force":
+        return []
     data_faults = []
     extreme = np.isin(values[starts], (values.max(), values.min()))
     elsewhere = int(lengths[~extreme].max(initial=1))
     for end, word in ((float(values.max()), "upper"), (float(values.min()), "lower")):
         at_end = values[starts] == end
         longest = int(lengths[at_end].max(initial=0))
-        if longest >= MIN_PLATEAU and longest > PLATEAU_FACTOR * elsewhere and math.fabs(end) > 0.0:
+        if name == "force" and word == "upper":
+            is_flat = is_cut_off(values, longest)
+        else:
+            is_flat = not is_coarse and longest > PLATEAU_FACTOR * elsewhere
+        if longest >= MIN_PLATEAU and is_flat and math.fabs(end) > 0.0:
             start = int(starts[at_end][lengths[at_end].argmax()])
             told = (
                 f"the {name} stands at its {word} end, {end:.6g}, for {longest} samples from "
@@ -89,6 +99,8 @@ def _plateaus(name: str, channel: Channel, shot: int) -> list[DataFault]:
                 f"({int((values == end).sum())} in all): clipped; choose a wider range"
             )
             data_faults.append(DataFault(Fault.CLIPPING, name, told, shot))
+    if is_coarse:
+        return data_faults
     inner = ~extreme
     stuck = inner & (lengths >= MIN_STUCK) & (lengths > PLATEAU_FACTOR * np.median(lengths) + MIN_STUCK)
     if stuck.any() and float(np.quantile(lengths, 0.9)) < 0.5 * MIN_STUCK:

@@ -24,6 +24,7 @@ from impactcell.discrepancy.data.prepared_shots import (
 from impactcell.discrepancy.data.tap import Tap
 from impactcell.discrepancy.data.unit_checks import check_units
 from impactcell.errors import CampaignError
+from impactcell.features import noise_std
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Channel, Samples
 
@@ -53,7 +54,7 @@ class PreparedCampaign:
     covariates : tuple of str
         Names of the covariates that vary: `OWN_COVARIATES` first, then further columns of `shots.csv`.
     stated_noise : tuple of float
-        Of force, position and actuator as stated; nan where nothing is.
+        Of force, position and actuator as stated, with what a coarse raster adds; nan where nothing is.
     notes : tuple of str
         What the data lack and what that costs; part of the report.
     """
@@ -238,7 +239,7 @@ def _stated_noise(captures: tuple[Capture, ...], name: str) -> float:
     for capture in captures:
         channel: Channel | None = getattr(capture, name)
         if channel is not None and channel.noise_std is not None:
-            return channel.noise_std
+            return noise_std(channel)
     return math.nan
 
 

@@ -164,3 +164,17 @@ def test_a_late_position_is_told_of_the_position(shots: tuple[Capture, ...]) -> 
 
     (data_fault,) = inspect_campaign(changed(shots, late_position, None))
     assert (data_fault.fault, data_fault.channel) == (Fault.LATE_CHANNEL, "position")
+
+
+@pytest.mark.parametrize(("raster_n", "raster_m"), [(0.5, 2e-6), (1.0, 5e-6), (5.0, 2e-5)])
+def test_a_coarse_raster_is_no_fault(shots: tuple[Capture, ...], raster_n: float, raster_m: float) -> None:
+    def rounded(shot: Capture) -> Capture:
+        assert shot.force is not None
+        assert shot.position is not None
+        return replace(
+            shot,
+            force=Channel(shot.force.time_s, np.round(shot.force.values / raster_n) * raster_n),
+            position=Channel(shot.position.time_s, np.round(shot.position.values / raster_m) * raster_m),
+        )
+
+    assert inspect_campaign(changed(shots, rounded, None)) == ()
