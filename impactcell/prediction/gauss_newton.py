@@ -12,6 +12,9 @@ RAISED_DAMPING = 1e-2
 turns the step. It is raised and lowered by factors of ten, as Marquardt (1963) does."""
 MAX_DAMPING = 1e8
 """Damping beyond which a step is rounding of a double."""
+STALLED_STEPS = 15
+"""Steps in a row that together gain nothing, damped and free, after which a minimum lies on a kink: a wall on
+one side refuses the steps that the other asks for. Two rounds of raised and lowered damping."""
 FREE_DAMPING = 1e-3
 """Damping up to which a step's length tells how far the minimum is: it is then shorter by a thousandth."""
 
@@ -107,11 +110,15 @@ def fit(problem: LeastSquares[PointT], initial_guess: Samples, stop: StopRule) -
     """
     best = problem.linearise(initial_guess)
     damping, refused = 0.0, math.inf
+    costs: list[float] = []
     for _ in range(stop.max_steps):
         step = problem.step(best, damping)
         if not math.isfinite(step.length):
             break
         noise = problem.noise(best)
+        costs.append(best.cost)
+        if len(costs) > STALLED_STEPS and costs[-STALLED_STEPS - 1] - best.cost < stop.cost * noise:
+            return best, step, True
         if step.length < stop.length**2 * noise and damping <= FREE_DAMPING:
             return best, step, True
         try:

@@ -107,3 +107,30 @@ def test_steps_that_come_to_an_end_first_are_not_called_a_minimum() -> None:
     few = StopRule(max_steps=3, length=1e-6, cost=1e-12, refused_cost=1e-10)
     _, _, converged = fit(Valley(), np.array([-1.2, 1.0]), few)
     assert not converged
+
+
+@dataclass
+class Kink:
+    """A slope down to a wall that its derivative does not see, as that of a tap is taken into one side."""
+
+    steepness: float
+
+    def linearise(self, theta: Array) -> Place:
+        residual = np.array([(theta[0] + 0.04) / 0.3, self.steepness * min(theta[0], 0.0)])
+        return Place(theta, residual, 0.5 * float(residual @ residual))
+
+    def step(self, start: Place, damping: float) -> Step:
+        step = -0.3 * start.residual[0] / (1.0 + damping)
+        return Step(start.theta + step, (step / 0.3) ** 2, np.array([[0.3**2]]))
+
+    def noise(self, at: Place) -> float:
+        assert at.cost >= 0.0
+        return 1.0
+
+
+@pytest.mark.parametrize("steepness", [100.0, 250.0, 300.0, 1000.0])
+def test_a_minimum_at_a_kink_is_one_though_steps_across_it_do_harm(steepness: float) -> None:
+    stop = StopRule(max_steps=40, length=0.02, cost=0.05, refused_cost=0.1)
+    minimum, _, converged = fit(Kink(steepness), np.array([0.1]), stop)
+    assert converged
+    assert minimum.cost == pytest.approx(0.5 * (0.04 / 0.3) ** 2, abs=stop.cost)
