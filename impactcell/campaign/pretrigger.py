@@ -11,6 +11,12 @@ from impactcell.records import Capture, Channel, since_contact
 
 FEWEST_SAMPLES = 10
 """Samples of force below which no contact is looked for: a baseline and a rise want as many."""
+RISE_SHARE = 0.5
+"""Rise of the force from the first to the last third before contact, in thresholds of contact, from which on
+it was no rest: where a part leans on the actuator to the end, what is taken for no contact is one. A straight
+rise up to the threshold makes 0.67 or more."""
+FEWEST_AT_REST = 12
+"""Samples before contact by which that can be told: four in a third."""
 MIN_LATE_STEPS = 3.0
 """Sampling steps by which a contact has to come late before a record is taken to have begun earlier."""
 MIN_LATE_S = 1e-3
@@ -52,11 +58,17 @@ def begun_before_contact(recorded: Campaign, counted: Campaign) -> frozenset[int
 
 
 def _late_onset(force: Channel | None) -> int | None:
-    """Sample at which contact begins; None where it is the first, or there is none to see."""
+    """Sample at which contact begins; None where it is the first, or where none, or no rest before, shows."""
     if force is None or len(force.values) < FEWEST_SAMPLES or np.ptp(force.values) == 0.0:
         return None
-    found = contacts.contact_onsets(force.time_s, force.values, contacts.baseline_of(force.values))
-    return found[0] if found and found[0] > 0 else None
+    baseline = contacts.baseline_of(force.values)
+    found = contacts.contact_onsets(force.time_s, force.values, baseline)
+    if not found or found[0] == 0:
+        return None
+    before = force.values[: found[0]]
+    third = len(before) // 3
+    rise = float(np.mean(before[-third:]) - np.mean(before[:third])) if len(before) >= FEWEST_AT_REST else 0.0
+    return found[0] if rise < RISE_SHARE * baseline.threshold else None
 
 
 def _from_onset(shots: Sequence[Capture], notes: list[str]) -> tuple[Capture, ...]:

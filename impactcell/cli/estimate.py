@@ -10,7 +10,7 @@ from collections.abc import Set as AbstractSet
 from pathlib import Path
 from typing import TextIO
 
-from impactcell.api.friction import calibrated, with_masses
+from impactcell.api.friction import calibrated_where_possible, with_masses
 from impactcell.campaign import Campaign, Excitation, begun_before_contact, from_contact, naming, read
 from impactcell.cli.paths import check_output
 from impactcell.discrepancy.data import check_campaign_units
@@ -120,7 +120,7 @@ def _of_taps(
             f"plant fitted to {len(fitted.used)} of {len(taps)} shots: {fitted.sentence}; "
             f"residuals {fitted.gap:.3g} times the noise"
         )
-    model = calibrated(plant, [tap.capture for tap in taps])
+    model = calibrated_where_possible(plant, [tap.capture for tap in taps])
     rows = []
     with progress("estimating", len(taps)) as advance:
         for tap in taps:

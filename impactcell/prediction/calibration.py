@@ -63,14 +63,13 @@ def regimes(plant: Plant, tap: TapInput, velocities: Samples, frictions: Samples
     ratio = plant.mu_k / plant.mu_s
     by_velocity = []
     for velocity in velocities.tolist():
-        kinds = {
-            _regime(replace(plant, mu_s=mu, mu_k=ratio * mu), replace(tap, velocity_m_s=velocity))
-            for mu in frictions.tolist()
-        }
-        if Regime.CAUGHT in kinds:
-            by_velocity.append(Regime.CAUGHT)
-        else:
-            by_velocity.append(kinds.pop() if len(kinds) == 1 else Regime.EITHER)
+        kinds: set[Regime] = set()
+        for mu in frictions.tolist():
+            kinds.add(_regime(replace(plant, mu_s=mu, mu_k=ratio * mu), replace(tap, velocity_m_s=velocity)))
+            if Regime.CAUGHT in kinds:  # and pushed without end, perhaps, which takes a second to tell
+                kinds = {Regime.CAUGHT}
+                break
+        by_velocity.append(kinds.pop() if len(kinds) == 1 else Regime.EITHER)
     return by_velocity
 
 

@@ -97,7 +97,7 @@ def _by_equations(
         coefficients = interpolate_mass(model, capture.mass_kg, velocity_m_s)
         warning = out_of_range(model, coefficients, velocity_m_s, math.nan, capture.stroke_m)
     except PredictionError as fault:
-        return _Equations(*[Coefficient(reason=str(fault))] * 3)
+        return _Equations(*[Coefficient(reason=force_fault or slide_fault or str(fault))] * 3)
     mu_force, mu_distance = Coefficient(reason=force_fault), Coefficient(reason=slide_fault)
     try:
         if math.isfinite(peak_force.value):

@@ -24,11 +24,18 @@ from impactcell.records import Capture, Channel, since_contact
 SPEED_RATIO = PlausibleRatio(
     0.05, 20.0, "the part's speed over the actuator's velocity", "position_m, time_s or velocity_mm_per_min"
 )
-"""The part leaves the actuator at one to two times its velocity."""
+"""The part leaves the actuator at one to two times its velocity, and slows down."""
 IMPULSE_RATIO = PlausibleRatio(
-    0.02, 50.0, "the impulse of force_n over mass times velocity", "force_n or mass_kg"
+    0.02, 50.0, "the impulse of force_n over mass times velocity and friction's impulse", "force_n or mass_kg"
 )
-"""The impulse of the contact makes about m v."""
+"""The impulse of the contact gives the part about m v, and bears friction as long as contact lasts."""
+TYPICAL_FRICTION = 0.2
+"""Coefficient by which friction's impulse is reckoned: from 0.05, polymer, to 0.8, dry metal, it is within a
+factor of four, where a wrong unit makes a thousand."""
+CONTACT_SHARE = 0.05
+"""Force over its largest from which on there is contact."""
+MIDDLE_OF_PATH = (0.25, 0.75)
+"""Shares of a part's path between which its speed is taken, however long a record goes on at rest."""
 MIN_SAMPLES = 8
 """Samples of a channel from which on its ratios mean anything."""
 RATIOS = (1.15, 1.5)
@@ -99,16 +106,19 @@ class Tap(ExcitationStrategy):
 
     def unit_ratios(self, shot: PreparedShot, gravity_m_s2: float) -> Mapping[PlausibleRatio, float]:
         """Speed of the part over that of the actuator, impulse over momentum."""
-        del gravity_m_s2
         time, position = shot.times[POSITION], shot.values[POSITION]
         if len(time) < MIN_SAMPLES:
             return {}
-        step = max(len(time) // 60, 1)
-        speed = np.abs(np.diff(position[::step]) / np.diff(time[::step]))
-        ratios = {SPEED_RATIO: float(np.quantile(speed, 0.95)) / shot.velocity_m_s}
+        path = np.abs(position - np.median(position[:MIN_SAMPLES]))
+        begin, end = (int(np.argmax(path >= share * path.max())) for share in MIDDLE_OF_PATH)
+        duration_s = max(float(time[end] - time[begin]), float(np.median(np.diff(time))))
+        ratios = {SPEED_RATIO: float(path[end] - path[begin]) / duration_s / shot.velocity_m_s}
         if len(shot.times[FORCE]) > MIN_SAMPLES and math.isfinite(shot.mass_kg):
-            impulse = float(np.trapezoid(np.maximum(shot.values[FORCE], 0.0), shot.times[FORCE]))
-            ratios[IMPULSE_RATIO] = impulse / (shot.mass_kg * shot.velocity_m_s)
+            force = np.maximum(shot.values[FORCE], 0.0)
+            in_contact = (force > CONTACT_SHARE * force.max()).astype(np.float64)
+            impulse, contact_s = (float(np.trapezoid(of, shot.times[FORCE])) for of in (force, in_contact))
+            speed_m_s = shot.velocity_m_s + TYPICAL_FRICTION * gravity_m_s2 * contact_s
+            ratios[IMPULSE_RATIO] = impulse / (shot.mass_kg * speed_m_s)
         return ratios
 
     def plant_guesses(self, shots: Sequence[PreparedShot], gravity_m_s2: float) -> list[dict[str, float]]:

@@ -233,3 +233,39 @@ def test_rows_replace_a_file_whole_or_not_at_all(tmp_path: Path, monkeypatch: py
         estimate(tmp_path / "c", PROTOTYPE, out)
     assert out.read_text(encoding="utf-8") == "before"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["c", "out.csv"]
+
+
+def pushed(velocity_mm_per_min: float, rest_s: float, stroke_m: float) -> list[Capture]:
+    """Taps that differ in velocity, with a record that goes on after the part has come to rest."""
+    rng, shots = np.random.default_rng(21), []
+    for number, factor in enumerate((1.0, 1.3, 1.7, 2.0), 1):
+        tap = Tap(factor * velocity_mm_per_min / 6e4, stroke_m=stroke_m, effects={})
+        motion = tap.motion()
+        time = np.arange(1, round((motion.end_s + rest_s) * 1e4)) * 1e-4
+        force = motion.force_n(time) + rng.normal(0.0, 0.4, time.size)
+        position = motion.position_m(time) + rng.normal(0.0, 1.5e-6, time.size)
+        shots.append(
+            Capture(
+                number, tap.velocity_m_s, tap.mass_kg, Channel(time, force, 0.4),
+                Channel(time, position, 1.5e-6), stroke_m=stroke_m,
+            )
+        )  # fmt: skip
+    return shots
+
+
+@pytest.mark.parametrize(
+    ("velocity", "rest_s", "stroke_m", "usable"),
+    [(2000.0, 2.0, 1.5e-3, 4), (400.0, 0.05, 1.5e-3, 1)],
+    ids=["a record that goes on for seconds", "a slow push, where friction outweighs momentum"],
+)
+def test_no_unit_is_doubted_where_none_is_wrong(
+    velocity: float, rest_s: float, stroke_m: float, usable: int, tmp_path: Path
+) -> None:
+    shots = pushed(velocity, rest_s, stroke_m)
+    estimate(campaign(tmp_path / "c", shots), output=tmp_path / "out.csv")
+    told = rows(tmp_path / "out.csv")
+    good = [row for row in told if row["quality"] == "good"]
+    assert len(good) >= usable
+    for row in good:
+        assert float(row["mu_k"]) == pytest.approx(0.152, abs=4.0 * float(row["mu_k_std"]))
+    assert not any("predictors" in row["reason"] for row in told)
