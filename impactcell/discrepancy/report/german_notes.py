@@ -12,7 +12,7 @@ from impactcell.discrepancy.report.german_words import phrase, term_name
 from impactcell.german.findings import with_decimal_commas
 
 Patterns = Sequence[tuple[str, str | Callable[[re.Match[str]], str]]]
-"""English as a pattern, and German as `re.sub` takes it; a function gives nothing where it knows no part."""
+"""English as a pattern, and German as that is expanded; a function gives nothing where it knows no part."""
 ENDS: Final = {"upper": "oberen", "lower": "unteren"}
 """Ends of a channel's range."""
 FAULTS: Final = {
