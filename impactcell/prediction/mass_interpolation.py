@@ -104,9 +104,9 @@ def interpolate_mass(model: Model, mass_kg: float, velocity_m_s: float) -> MassI
 
 
 def velocity_range_m_s(model: Model, mass_kg: float) -> tuple[float, float]:
-    """Velocities that a mass is calibrated for, in whatever regime."""
-    most = max(predictor.velocity_range_m_s[1] for predictor in model.predictors)
-    slow, fast = (interpolate_mass(model, mass_kg, velocity) for velocity in (0.0, most))
+    """Velocities that a mass is calibrated for, in whatever regime; raises as `interpolate_mass`."""
+    slowest, fastest = zip(*(predictor.velocity_range_m_s for predictor in model.predictors), strict=True)
+    slow, fast = (interpolate_mass(model, mass_kg, velocity) for velocity in (min(slowest), max(fastest)))
     return slow.velocity_range_m_s[0], fast.velocity_range_m_s[1]
 
 
