@@ -6,7 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.measurements.gains import SIGNALS
-from impactcell.measurements.recognition import CHANNELS, VOCABULARY, WORD_MATCH, ColumnMeaning, name_score
+from impactcell.measurements.recognition import (
+    CHANNELS,
+    ROTATION_WORDS,
+    VOCABULARY,
+    WORD_MATCH,
+    ColumnMeaning,
+    name_score,
+)
 from impactcell.measurements.sampling_step import sampling_step_s
 from impactcell.measurements.table import Table
 from impactcell.measurements.units import Dimension, MeasuredUnit
@@ -82,9 +89,11 @@ def _of_column(item: Assignment) -> list[str]:
         return []
     faults = []
     if item.unit is None:
+        rotates = name_score(item.column, item.meaning)[1] in ROTATION_WORDS
+        unit = VOCABULARY[item.meaning].dimensions[1 if rotates else 0].value
         faults.append(
-            f"column {item.column!r} ({item.meaning}) has no unit; say --unit '{item.column}="
-            f"{VOCABULARY[item.meaning].dimensions[0].value}', or which it is"
+            f"column {item.column!r} ({item.meaning}) has no unit; say --unit '{item.column}={unit}', or "
+            f"which it is"
         )
     elif item.unit.dimension not in VOCABULARY[item.meaning].dimensions:
         faults.append(

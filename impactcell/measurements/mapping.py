@@ -19,6 +19,7 @@ from impactcell.measurements.recognition import (
 )
 from impactcell.measurements.table import MeasuredColumn, Table
 from impactcell.measurements.units import Dimension, MeasuredUnit, parse_unit
+from impactcell.records import Samples
 
 GIVEN = 1.0
 """Confidence of what was given."""
@@ -277,6 +278,12 @@ def _further(column: MeasuredColumn, given: Given) -> Assignment:
     unit = _unit_of(column, given)
     if column.name in given.others:
         return Assignment(column.name, given.others[column.name], unit, GIVEN, "given")
-    if column.text is None and len(column.values) > 2 and (np.diff(column.values) == 1.0).all():
+    if column.text is None and len(column.values) > 2 and _counts(column.values):
         return Assignment(column.name, ColumnMeaning.IGNORED, unit, UNIT_MATCH + SURE, "counts the rows")
     return Assignment(column.name, ColumnMeaning.COVARIATE, unit, SURE, "none of the known quantities")
+
+
+def _counts(values: Samples) -> bool:
+    """Whether a column goes by equal steps: it counts rows, or is one more time."""
+    steps = np.diff(values)
+    return bool(steps[0] != 0.0 and np.allclose(steps, steps[0], rtol=1e-6, atol=0.0))

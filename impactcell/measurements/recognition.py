@@ -95,6 +95,10 @@ VOCABULARY = {
     ColumnMeaning.START: Words("start start_position startposition startlage", "", (Dimension.LENGTH,)),
 }
 """How columns are called."""
+ROTATION_WORDS = frozenset(
+    ("torque", "moment", "drehmoment", "tau", "angle", "winkel", "encoder", "theta", "phi")
+)
+"""Of these the words that are met of a rotation."""
 
 WORD_MATCH, TOKEN_MATCH, SYMBOL_MATCH = 0.65, 0.55, 0.4
 """How sure a name makes one: the whole name, a word of it, a letter."""
@@ -118,7 +122,10 @@ COMMAND_WORDS = frozenset(
 """Words of a name that say that it was not measured."""
 RATE_WORDS = "sample_rate sampling_rate rate_hz abtastrate samplerate fs sampling_frequency abtastfrequenz"
 """Names under which a file says how often it was sampled."""
-STEP_WORDS = "dt sample_interval wf_increment abtastzeit sampling_interval abtastintervall delta_x increment"
+STEP_WORDS = (
+    "dt sample_interval wf_increment abtastzeit sampling_interval abtastintervall delta_x increment interval "
+    "sampling_time_interval"
+)
 """Names under which a file says the step of its time."""
 
 

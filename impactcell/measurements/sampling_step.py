@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from impactcell.measurements.numbers import parse_number
 from impactcell.measurements.recognition import RATE_WORDS, STEP_WORDS, normalised
 from impactcell.measurements.table import Table
-from impactcell.measurements.units import Dimension, parse_unit
+from impactcell.measurements.units import Dimension, parse_unit, split_unit
 
 
 def sampling_step_s(table: Table, constants: Mapping[str, float]) -> float | None:
@@ -21,14 +21,15 @@ def sampling_step_s(table: Table, constants: Mapping[str, float]) -> float | Non
 
 
 def _step(key: str, text: str) -> float | None:
-    name = normalised(key)
+    name, unit_of_key = split_unit(key)
+    name = normalised(name)
     number = _first_number(text)
     if number is None or not 0.0 < number < math.inf:
         return None
     if any(word == name or name.startswith(word) for word in RATE_WORDS.split()):
         return 1.0 / (number * (1e3 if "khz" in (key + text).lower() else 1.0))
     if any(word == name or name.startswith(word) for word in STEP_WORDS.split()):
-        unit = parse_unit(text.rsplit(maxsplit=1)[-1]) if len(text.split()) > 1 else None
+        unit = parse_unit(text.rsplit(maxsplit=1)[-1] if len(text.split()) > 1 else unit_of_key or "")
         return number * (unit.factor if unit and unit.dimension is Dimension.TIME else 1.0)
     return None
 

@@ -22,6 +22,9 @@ HEADER_ROWS = 4
 COMMENT_SIGNS = ("#", "%", "//")
 """Begin of a line that is no row."""
 
+UNIT_LABELS = frozenset(("unit", "units", "einheit", "einheiten"))
+"""What stands before the units of a row, and is none of them."""
+
 Row = tuple[int, list[str]]
 """Index of a line, and its cells."""
 
@@ -74,24 +77,20 @@ def find_layout(lines: Sequence[str], source: str, delimiter: str, decimal: str)
             f"cut off "
             f"what is before the table"
         )
-    above = _rows_above(lines, first, delimiter, width, source)
-    with_numbers = [row for row in above if _has_number(row[1], numeric, decimal)]
-    for index, cells in with_numbers:
-        if not is_comment(lines[index]):
+    above: list[Row] = []
+    for index, cells in _rows_above(lines, first, delimiter, width, source):
+        if not _has_number(cells, numeric, decimal):
+            above.append((index, cells))
+        elif above and _has_word(cells, numeric, decimal):
+            break  # a figure of the preamble, as `Interval,0.0005,Interval,0.0005` above names and units
+        elif not is_comment(lines[index]):
             raise MeasurementError(
                 f"{source}:{index + 1}: {delimiter.join(cells)[:60]!r} is neither a header nor a row of "
                 f"numbers; correct or remove the line"
             )
-    above = [row for row in above if row not in with_numbers]
     unit_row = next((row for row in above if _is_unit_row(row[1])), None)
     header = _header(above, unit_row)
-    names, units = [""] * width, [""] * width
-    if header is not None:
-        for place, cell in enumerate(header[1]):
-            names[place], unit = split_unit(cell)
-            units[place] = unit or ""
-    if unit_row is not None:
-        units = [cell.strip("[]() ") or unit for cell, unit in zip(unit_row[1], units, strict=True)]
+    names, units = _named(header, unit_row, above, width)
     table_rows = [row[0] for row in (header, unit_row) if row is not None]
     return Layout(
         tuple(names), tuple(unit or None for unit in units), numeric, first,
@@ -106,6 +105,38 @@ def _has_number(cells: Sequence[str], numeric: frozenset[int], decimal: str) -> 
         parse_number(cells[column], decimal) is not None and not is_missing(cells[column])
         for column in numeric
     )
+
+
+def _has_word(cells: Sequence[str], numeric: frozenset[int], decimal: str) -> bool:
+    """Whether a row has a text where the table has numbers."""
+    return any(
+        parse_number(cells[column], decimal) is None and not is_missing(cells[column]) for column in numeric
+    )
+
+
+def _named(
+    header: Row | None, unit_row: Row | None, above: Sequence[Row], width: int
+) -> tuple[list[str], list[str]]:
+    """Names and units of the columns, from a row each or from one row of both."""
+    names, units = [""] * width, [""] * width
+    if header is None:
+        return names, units
+    for place, cell in enumerate(header[1]):
+        names[place], unit = split_unit(cell)
+        units[place] = unit or ""
+    if unit_row is not None:
+        for place, cell in enumerate(unit_row[1]):
+            if cell.strip().lower() in UNIT_LABELS:
+                names[place] = ""  # what stands here says of its row what it is, not of its column
+            else:
+                units[place] = cell.strip("[]() ") or units[place]
+        return names, units
+    over = next((row[1] for row in above if row[0] < header[0]), None)
+    for place, cell in enumerate(header[1]):
+        # A row may hold units of some columns and better names of others: `Time, Channel 1` over `ms, Speed`.
+        if over is not None and over[place] and parse_unit(cell) and not parse_unit(over[place]):
+            names[place], units[place] = over[place], cell
+    return names, units
 
 
 def is_comment(line: str) -> bool:
@@ -186,7 +217,7 @@ def _header_cells(line: str, delimiter: str, width: int) -> list[str]:
 
 
 def _is_unit_row(cells: list[str]) -> bool:
-    filled = [cell for cell in cells if cell.strip("[]() ")]
+    filled = [cell for cell in cells if cell.strip("[]() ") and cell.strip().lower() not in UNIT_LABELS]
     known = sum(parse_unit(cell) is not None for cell in filled)
     return bool(filled) and known > 0.6 * len(filled)
 
@@ -212,4 +243,6 @@ def _attributes(lines: Sequence[str], delimiter: str) -> dict[str, str]:
         cells = [cell for cell in split_cells(text, delimiter) if cell] if delimiter != " " else []
         if len(cells) in (2, 3):
             said[cells[0]] = " ".join(cells[1:])
+        elif len(cells) % 2 == 0 and len({*cells[::2]}) == 1 == len({*cells[1::2]}):
+            said[cells[0]] = cells[1]  # once for each channel
     return said

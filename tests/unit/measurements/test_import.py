@@ -25,6 +25,7 @@ from impactcell.measurements import (
     write_campaign,
 )
 from impactcell.measurements.given import read_given
+from impactcell.measurements.units import split_unit
 from impactcell.prediction import estimate_from_features
 from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.web.texts.import_notes import page_note
@@ -430,3 +431,19 @@ def test_one_column_in_two_units_is_refused_unless_one_was_given() -> None:
         make_campaign(tables, guess(tables, Given(constants=VOLTS)))
     given = Given(constants=VOLTS, units={"Kraft": "N"})
     assert len(make_campaign(tables, guess(tables, given)).campaign.shots) == 2
+
+
+def test_what_goes_in_is_not_in_inches() -> None:
+    time = 1e-3 * np.arange(200)
+    tables = [table(time_s=("s", time), u_in=(None, np.sin(time)), torque=(None, np.cos(time)))]
+    mapping = guess(tables)
+    assert mapping.of(ColumnMeaning.POSITION) is None
+    assert split_unit("u_in") == ("u_in", None)
+    assert split_unit("pos_inch") == ("pos", "inch")
+    assert any("--unit 'torque=N m'" in fault for fault in mapping.faults)
+
+
+def test_one_more_time_is_no_covariate() -> None:
+    time = 1e-3 * np.arange(200)
+    mapping = guess([table(t=("s", time), clock=(None, 7.0 + 3.0 * time), x=("mm", np.cos(time)))])
+    assert [item.meaning for item in mapping.assignments if item.column == "clock"] == [ColumnMeaning.IGNORED]

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from impactcell.errors import MeasurementError
 from impactcell.measurements import Dialect, Limits, Table, read_tables
+from impactcell.measurements.sampling_step import sampling_step_s
 
 DIALECTS = [(";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), ("|", ","), (" ", "."), (" ", ",")]
 HEADERS = [("Time", "Force", "Position"), ("Zeit", "Kraft", "Weg"), ("Größe t", "Schlag µ", "x°")]
@@ -220,3 +221,38 @@ def test_a_number_in_a_comment_is_no_row_of_the_table(tmp_path: Path) -> None:
     table = one(path)
     assert [column.name for column in table.columns] == ["Time", "Force", "Position"]
     assert table.attributes["Masse"] == "18,9 kg"
+
+
+def test_a_preamble_with_figures_above_names_and_units(tmp_path: Path) -> None:
+    """One pair of columns a channel, and rows that say themselves what they are."""
+    path = tmp_path / "a.csv"
+    head = "Timestamp,2020-03-16 17:04:51,Timestamp,2020-03-16 17:04:51\nInterval,0.0005,Interval,0.0005\n"
+    head += 'Channel name,"Force",Channel name,"Input 1"\nUnit,"V",Unit,"V"\n'
+    rows = [f"{5e-4 * i:g},{0.1 * i},{5e-4 * i:g},{-0.2 * i}" for i in range(40)]
+    path.write_text(head + "\n".join(rows), encoding="utf-8")
+    table = one(path)
+    assert [(column.name, column.unit) for column in table.columns] == [
+        ("column 1", None), ("Force", "V"), ("column 3", None), ("Input 1", "V"),
+    ]  # fmt: skip
+    assert table.attributes["Interval"] == "0.0005"
+    assert sampling_step_s(table, {}) == 5e-4
+    assert table.columns[1].values == pytest.approx(0.1 * np.arange(40))
+
+
+def test_names_and_units_mixed_over_two_lines(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    head = "Axis1\nNumber of sampling data,40\nSampling time interval(ms),0.667\n"
+    head += "Time,Analog 1,Analog 2\nms,Servo motor speed,Torque\n"
+    path.write_text(head + "\n".join(f"{0.667 * i:g},{i},{-i}" for i in range(40)), encoding="utf-8")
+    table = one(path)
+    assert [(column.name, column.unit) for column in table.columns] == [
+        ("Time", "ms"), ("Servo motor speed", None), ("Torque", None),
+    ]  # fmt: skip
+    assert sampling_step_s(table, {}) == pytest.approx(6.67e-4)
+
+
+def test_a_broken_first_row_is_no_preamble(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,F\n0.0,oops\n" + "\n".join(f"{i},{i}" for i in range(1, 40)), encoding="utf-8")
+    with pytest.raises(MeasurementError, match=r":2: '0.0,oops' is neither"):
+        one(path)
