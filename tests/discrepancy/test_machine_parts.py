@@ -10,7 +10,7 @@ import pytest
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine import finding as machine_finding
 from impactcell.discrepancy.machine import proof, simulation, uniform_records
-from impactcell.discrepancy.machine.base_model import Response
+from impactcell.discrepancy.machine.base_model import BaseModel, Response
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
 
@@ -52,6 +52,25 @@ def test_spikes_are_taken_out_of_a_signal_far_from_nought() -> None:
     assert clean == pytest.approx(values, abs=0.02)
 
 
+def test_a_spike_is_replaced_by_the_line_between_its_neighbours() -> None:
+    values = np.linspace(0.0, 5.99, 600)
+    spoilt = values.copy()
+    spoilt[[0, 150, 151, 400]] += [30.0, 30.0, 28.0, -25.0]
+    clean, spikes = uniform_records._without_spikes(spoilt)
+    assert spikes == 4
+    assert clean[1:] == pytest.approx(values[1:], abs=1e-12)
+    assert clean[0] == values[1]
+
+
+def test_a_push_of_some_samples_is_no_spike() -> None:
+    values = np.random.default_rng(3).normal(0.0, 1.0, 6000)
+    for place, height in enumerate((60.0, 55.0, 43.0, 23.0)):
+        values[300 + place :: 500] += height
+    clean, spikes = uniform_records._without_spikes(values)
+    assert spikes == 0
+    assert (clean == values).all()
+
+
 def test_the_correlation_time_is_that_which_went_in() -> None:
     """White noise averaged over m steps has the correlations 1 - l / m: their sum is (m + 1) / 2 steps."""
     rng, m, step = np.random.default_rng(2), 12, 0.01
@@ -78,7 +97,7 @@ def test_held_out_stretches_are_simulated_from_begin_to_end(monkeypatch: pytest.
         held_spans=[(0, 2.0, 3.0), (0, 7.0, 9.9)], records=[record], scale=SimpleNamespace(period_s=1.0)
     )
     response = next(kind for kind in Response if kind is not Response.FORCE)
-    model: Any = SimpleNamespace(base=SimpleNamespace(response=response))
+    model: Any = SimpleNamespace(base=BaseModel(response=response))
     error = simulation.simulate_held_out(found, model)
     times = [record.time_s[stretch] for stretch in stretches]
     assert [(part[0], part[-1]) for part in times] == [
@@ -99,7 +118,7 @@ def test_held_out_stretches_are_simulated_from_begin_to_end(monkeypatch: pytest.
 def test_a_simulation_that_errs_more_with_a_named_term_is_told(
     established: tuple[str, ...], rmse: tuple[float, float], said: bool
 ) -> None:
-    base = SimpleNamespace(response=Response.POSITION, coordinate=Coordinate.TRANSLATION)
+    base = BaseModel(response=Response.POSITION, coordinate=Coordinate.TRANSLATION)
     found: Any = SimpleNamespace(established=established, base=base)
     errors: Any = tuple(machine_finding.OpenLoopError(error, 50.0, math.nan) for error in rmse)
     notes = notes_of_simulation(found, errors)

@@ -8,6 +8,7 @@ from impactcell.discrepancy.machine.finding import (
     MachineLaw,
     OpenLoopError,
 )
+from impactcell.discrepancy.machine.held_out_stretch import drifts
 from impactcell.discrepancy.machine.investigation import investigate_machine
 from impactcell.discrepancy.machine.law_terms import LAW_PLACES, term_of
 from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, VALUES
@@ -37,6 +38,7 @@ __all__ = [
     "Term",
     "TermChoice",
     "Trial",
+    "drifts",
     "investigate_machine",
     "motions",
     "simulate_held_out",

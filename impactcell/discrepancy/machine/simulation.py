@@ -1,22 +1,32 @@
 """Open-loop simulation of held-out stretches: a model runs by itself, from the first state of each.
 
 Steps are Moreau's: position at the half step, all forces but friction at once, and friction as an impulse
-that may stop the part and never turns it. Where the force is predicted, the measured motion is the input.
+that may stop the part and never turns it. Where the force is predicted, the measured motion is the input, and
+both forces are averaged as the regression averages.
 """
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, OpenLoopError
+from impactcell.discrepancy.machine.held_out_stretch import (
+    START_PERIODS,
+    constant_forces,
+    drifts,
+    first_state,
+    settled_start,
+)
 from impactcell.discrepancy.machine.law_terms import term_of
+from impactcell.discrepancy.machine.regression import PRIOR_REACH
 from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord, carried_force
 from impactcell.discrepancy.machine.weak_form import (
     ECCENTRICITY,
+    averaged,
     direction_of_motion,
     eccentricity_waves,
     half_supports,
@@ -27,12 +37,6 @@ from impactcell.records import Samples
 
 STEPS_PER_PERIOD = 200
 """Least steps in a period of the motion: second order, a step errs by (2 pi / 200)² / 24 of its force [1]."""
-START_SAMPLES = 5
-"""Samples at either side by which the first speed is looked for at first [samples]."""
-START_PERIODS = 1.0
-"""Periods of the motion, or a quarter of a stretch, by which its first state is fitted."""
-START_NUDGE = 1e-3
-"""Size of the nudges that tell how a motion follows from its first state, over its range."""
 
 
 def simulate_held_out(finding: MachineFinding, model: FittedModel) -> OpenLoopError:
@@ -45,7 +49,10 @@ def simulate_held_out(finding: MachineFinding, model: FittedModel) -> OpenLoopEr
     if model.base.response is Response.FORCE:
         # At rest friction takes whatever balances the drive; no model says what.
         simulated = [needed_force(model, record, stretch, finding.scale) for record, stretch in stretches]
-        measured = [record.force[stretch] for record, stretch in stretches]
+        measured = [
+            averaged(record.force, _half_average(record, finding.scale), record.step_s)[stretch]
+            for record, stretch in stretches
+        ]
     else:
         simulated = _positions(model, stretches, finding.scale.period_s)
         measured = [record.position[stretch] for record, stretch in stretches]
@@ -58,49 +65,74 @@ def simulate_held_out(finding: MachineFinding, model: FittedModel) -> OpenLoopEr
 
 
 def needed_force(model: FittedModel, record: UniformRecord, stretch: slice, scale: MotionScale) -> Samples:
-    """Force that the measured motion needs; nan where the part rests or turns."""
-    half, narrow = half_supports(record, scale)
-    velocity, noise = smoothed_speed(record.position, narrow, record.step_s)
-    acceleration = smoothed_acceleration(record.position, max(half // 2, narrow), record.step_s)
+    """Force that the measured motion needs, averaged; nan where the part rests or turns."""
+    half = _half_average(record, scale)
+    velocity, noise = smoothed_speed(record.position, half_supports(record, scale)[1], record.step_s)
+    acceleration = smoothed_acceleration(record.position, half, record.step_s)
     direction = direction_of_motion(velocity, scale, noise * record.noise[0])
     carried = carried_force(Response.FORCE, record.force, model.gravity * np.sin(record.position))
     covariates = {
         term.choice.covariate: np.full(velocity.shape, record.covariates.get(term.choice.covariate, 0.0))
         for term in model.terms
     }
-    smooth, friction = _terms(model, covariates, record.position, velocity, np.abs(carried))
-    needed = (record.inertia * acceleration + model.base.gravity_torque.value * np.sin(record.position)) * (
-        1.0 + model.nuisance("force_gain")
-    )
-    needed += record.inertia * model.nuisance("inertia") * acceleration
-    force: Samples = needed - smooth - model.nuisance("force_offset") + direction * friction
-    force -= _gravity_deviation(model, record.position)
+    smooth, friction = _law(model, covariates)(record.position, velocity, np.abs(carried))
+    gain = 1.0 + model.nuisance("force_gain")
+    gravity = gain * model.base.gravity_torque.value * np.sin(record.position)
+    deviation = _gravity_deviation(model, record.position)
+    beside = gravity - smooth - model.nuisance("force_offset") + direction * friction - deviation
+    force = averaged(beside, half, record.step_s)
+    force += record.inertia * (gain + model.nuisance("inertia")) * acceleration
     eccentricity = _eccentricity(model)
     if eccentricity.any():
         wave = eccentricity @ eccentricity_waves(record.position)
-        bent = smoothed_acceleration(wave, max(half // 2, narrow), record.step_s)
+        bent = smoothed_acceleration(wave, half, record.step_s)
         force -= record.inertia * bent + model.gravity * np.cos(record.position) * wave
     delayed = np.interp(record.time_s - model.delay_s, record.time_s, force)
     return np.where(np.abs(direction) < 1.0, np.nan, delayed)[stretch]
 
 
+def _half_average(record: UniformRecord, scale: MotionScale) -> int:
+    """Half the samples over which forces are averaged."""
+    half, narrow = half_supports(record, scale)
+    return max(half // 2, narrow)
+
+
 def _positions(
     model: FittedModel, stretches: Sequence[tuple[UniformRecord, slice]], period_s: float
 ) -> list[Samples]:
-    """Positions that the measured forces lead to, all stretches at once."""
+    """Positions that the measured forces lead to, all stretches at once.
+
+    Where a constant force adds up, each stretch has one of its own beside the model's.
+    """
     records = [record for record, _ in stretches]
     measured = [record.position[stretch] for record, stretch in stretches]
     drives, start = [], np.empty((2, len(records)))
     for lane, (record, stretch) in enumerate(stretches):
         drives.append(np.interp(record.time_s[stretch] + model.delay_s, record.time_s, record.force))
-        start[:, lane] = _first_state(record.position[stretch], record.step_s)
+        start[:, lane] = first_state(record.position[stretch], record.step_s)
     run = _runner(model, records, drives, period_s)
     begin = [
         max(min(int(START_PERIODS * period_s / record.step_s), len(values) // 4), 2)
         for record, values in zip(records, measured, strict=True)
     ]
-    start = _settled_start(lambda state: run(state, max(begin)), start, measured, begin)
-    out = run(start, max(map(len, measured)))
+    constant = np.zeros(len(records))
+    adrift = drifts(model.base)
+    if adrift:
+        beside = _runner(model, records * 2, drives * 2, period_s)
+
+        def settled(state: Samples, constant: Samples) -> Samples:
+            return constant_forces(
+                lambda forces: beside(np.tile(state, 2), max(map(len, measured)), forces),
+                (drives, measured),
+                constant,
+                PRIOR_REACH * model.base.force_offset.std,
+            )
+
+        constant = settled(start, constant)
+    start = settled_start(lambda state: run(state, max(begin), constant), start, measured, begin)
+    if adrift:
+        constant = settled(start, constant)
+    out = run(start, max(map(len, measured)), constant)
     return [out[: len(values), lane] for lane, values in enumerate(measured)]
 
 
@@ -116,8 +148,11 @@ def positions_from(
 
 def _runner(
     model: FittedModel, records: Sequence[UniformRecord], drives: Sequence[Samples], period_s: float
-) -> Callable[[Samples, int], Samples]:
-    """Run all drives side by side: from first states (2, lanes) to positions (samples, lanes)."""
+) -> Callable[..., Samples]:
+    """Run all drives side by side: from first states (2, lanes) to positions (samples, lanes).
+
+    `run(state, count, constant)`: the last is a constant force of each lane, 0 where it is left out.
+    """
     parts = max(math.ceil(STEPS_PER_PERIOD * max(record.step_s for record in records) / period_s), 1)
     step = np.array([record.step_s for record in records]) / parts
     drive = np.zeros((max(map(len, drives)) + 1, len(records)))
@@ -125,102 +160,69 @@ def _runner(
         drive[: len(force), lane] = force
         drive[len(force) :, lane] = force[-1]
     drive = drive * (1.0 + model.nuisance("force_gain")) + model.nuisance("force_offset")
-    machine = _Lanes(
-        np.array([record.inertia for record in records]) * (1.0 + model.nuisance("inertia")),
-        {
-            term.choice.covariate: np.array(
-                [record.covariates.get(term.choice.covariate, 0.0) for record in records]
-            )
-            for term in model.terms
-        },
+    inertia = np.array([record.inertia for record in records]) * (1.0 + model.nuisance("inertia"))
+    columns = {term.choice.covariate for term in model.terms}
+    law = _law(
+        model, {name: np.array([record.covariates.get(name, 0.0) for record in records]) for name in columns}
     )
-
+    sine_torque = model.base.gravity_torque.value + model.nuisance("gravity_torque")
+    cosine_torque = model.gravity * model.nuisance("position_offset")
     eccentricity = _eccentricity(model)
 
-    def run(state: Samples, count: int) -> Samples:
+    def reading(angle: Samples) -> Samples:
+        """Give what an encoder off its centre reads beside the angle."""
+        return eccentricity @ eccentricity_waves(angle) if eccentricity.any() else np.zeros(angle.shape)
+
+    def advance(q: Samples, v: Samples, force: Samples) -> tuple[Samples, Samples]:
+        """One step of Moreau's scheme, its speeds at the middle of the step."""
+        middle = q + 0.5 * step * v
+        sine = np.sin(middle)
+        load = np.abs(force + model.gravity * sine)
+        outside = force - sine_torque * sine + cosine_torque * np.cos(middle)
+        ahead = v
+        for _ in range(2):
+            smooth, friction = law(middle, 0.5 * (v + ahead), load)
+            freely = v + step * (outside + smooth) / inertia
+            held = step * np.maximum(friction, 0.0) / inertia
+            ahead = np.sign(freely) * np.maximum(np.abs(freely) - held, 0.0)
+        return middle + 0.5 * step * ahead, ahead
+
+    def run(state: Samples, count: int, constant: Samples | float = 0.0) -> Samples:
         slope = eccentricity @ np.stack([-np.sin(state[0]), np.cos(state[0])])
-        q, v = state[0] - eccentricity @ eccentricity_waves(state[0]), state[1] * (1.0 - slope)
+        q, v = state[0] - reading(state[0]), state[1] * (1.0 - slope)
         out = np.empty((count, len(records)))
         for place in range(count):
-            out[place] = q + eccentricity @ eccentricity_waves(q)
+            out[place] = q + reading(q)
             for part in range(parts):
                 share = (part + 0.5) / parts
-                q, v = _advance(
-                    model, machine, (q, v), (1.0 - share) * drive[place] + share * drive[place + 1], step
-                )
+                q, v = advance(q, v, (1.0 - share) * drive[place] + share * drive[place + 1] + constant)
         return out
 
     return run
 
 
-def _settled_start(
-    run: Callable[[Samples], Samples], start: Samples, measured: Sequence[Samples], begin: Sequence[int]
-) -> Samples:
-    """First states, shape (2, lanes), by least squares of a model over the begin of each stretch.
+def _law(
+    model: FittedModel, covariates: Mapping[str, Samples]
+) -> Callable[[Samples, Samples, Samples], list[Samples]]:
+    """Sum of all smooth forces, and level of friction, of position, velocity and load: shape (n,) each."""
+    parts = [
+        (
+            term_of(chosen.choice),
+            chosen,
+            np.array([model.value(column) for column in chosen.columns]),
+            covariates[chosen.choice.covariate],
+        )
+        for chosen in model.terms
+    ]
 
-    The speed that a few samples show errs by more than the model does; one Gauss-Newton step from it.
-    """
-    reached = [float(np.ptp(values)) for values in measured]
-    nudge = START_NUDGE * np.array([reached, reached])
-    nudge[1] *= np.abs(start[1]).max() / max(*reached, np.finfo(float).tiny) + 1.0
-    plain = run(start)
-    moved = [run(start + nudge * np.array([[1.0 - axis], [axis]])) - plain for axis in (0.0, 1.0)]
-    settled = start.copy()
-    for lane, (values, count) in enumerate(zip(measured, begin, strict=True)):
-        slopes = np.stack([change[:count, lane] for change in moved], axis=1)
-        left = values[:count] - plain[:count, lane]
-        step = np.linalg.lstsq(slopes, left, rcond=1e-6)[0] * nudge[:, lane]
-        settled[:, lane] += step
-    after = run(settled)
-    for lane, (values, count) in enumerate(zip(measured, begin, strict=True)):
-        errors = [float(np.sum((values[:count] - out[:count, lane]) ** 2)) for out in (plain, after)]
-        if not errors[1] < errors[0]:
-            settled[:, lane] = start[:, lane]
-    return settled
+    def law(position: Samples, velocity: Samples, load: Samples) -> list[Samples]:
+        sums = [np.zeros(position.shape), np.zeros(position.shape)]
+        for term, chosen, strengths, covariate in parts:
+            features = term.features(MotionState(position, velocity, load, covariate), chosen.shape)
+            sums[term.is_friction] += strengths @ features
+        return sums
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Lanes:
-    """What differs from stretch to stretch: inertia, and each column of `shots.csv`, shape (lanes,)."""
-
-    inertia: Samples
-    covariates: Mapping[str, Samples]
-
-
-def _advance(
-    model: FittedModel, machine: _Lanes, state: tuple[Samples, Samples], drive: Samples, step: Samples
-) -> tuple[Samples, Samples]:
-    """One step of Moreau's scheme, its speeds at the middle of the step."""
-    q, v = state
-    middle = q + 0.5 * step * v
-    ahead = v
-    gravity = model.base.gravity_torque.value * np.sin(middle)
-    load = np.abs(drive + model.gravity * np.sin(middle))
-    for _ in range(2):
-        smooth, friction = _terms(model, machine.covariates, middle, 0.5 * (v + ahead), load)
-        total = drive - gravity + smooth + _gravity_deviation(model, middle)
-        freely = v + step * total / machine.inertia
-        held = step * np.maximum(friction, 0.0) / machine.inertia
-        ahead = np.sign(freely) * np.maximum(np.abs(freely) - held, 0.0)
-    return middle + 0.5 * step * ahead, ahead
-
-
-def _terms(
-    model: FittedModel, covariates: Mapping[str, Samples], position: Samples, velocity: Samples, load: Samples
-) -> tuple[Samples, Samples]:
-    """Sum of all smooth forces, and level of friction, shape (n,) each."""
-    smooth, friction = np.zeros(position.shape), np.zeros(position.shape)
-    for chosen in model.terms:
-        term = term_of(chosen.choice)
-        covariate = covariates[chosen.choice.covariate]
-        features = term.features(MotionState(position, velocity, load, covariate), chosen.shape)
-        for column, feature in zip(chosen.columns, features, strict=True):
-            value = model.value(column) * feature
-            if term.is_friction:
-                friction += value
-            else:
-                smooth += value
-    return smooth, friction
+    return law
 
 
 def motions(finding: MachineFinding) -> list[MotionState]:
@@ -271,10 +273,3 @@ def _gravity_deviation(model: FittedModel, position: Samples) -> Samples:
 def _eccentricity(model: FittedModel) -> Samples:
     """Amplitudes e_c and e_s of an encoder that turns off its centre, shape (2,)."""
     return np.array([model.value((ECCENTRICITY, 0.0, number)) for number in range(2)])
-
-
-def _first_state(position: Samples, step: float) -> tuple[float, float]:
-    """Position and speed at the first sample, by a parabola."""
-    time = step * np.arange(4 * START_SAMPLES + 1)
-    curve = np.polynomial.Polynomial.fit(time, position[: len(time)], 3)
-    return float(curve(0.0)), float(curve.deriv()(0.0))

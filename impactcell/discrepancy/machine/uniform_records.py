@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import binary_opening, median_filter
 
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
@@ -23,6 +23,8 @@ SPIKE_FACTOR = 8.0
 """A spike differs from the running median this many times more than 95 % of the samples do [1]."""
 MIN_SPIKE_SHARE = 0.05
 """And by at least this share of the channel's range [1]."""
+MAX_SPIKE_SAMPLES = 2
+"""Samples in a row that are a spike, as where data are inspected: the pushes of a controller last longer."""
 MAX_HIDDEN_SHARE = 0.25
 """Share of the force's mean square that averaging over a test function may hide of the inertial force [1]."""
 SPANS_PER_PERIOD = 11.0
@@ -159,13 +161,16 @@ def _noise(channel: Channel, values: Samples) -> float:
 
 
 def _without_spikes(values: Samples) -> tuple[Samples, int]:
-    """Replace samples far from the running median by it."""
-    middle = median_filter(values, SPIKE_WINDOW, mode="nearest")
+    """Replace one or two samples far from the running median by the line between their neighbours."""
+    middle = median_filter(values, SPIKE_WINDOW, mode="mirror")
     distance = np.abs(values - middle)
     usual = float(np.quantile(distance, 0.95))
     span = float(np.subtract(*np.quantile(values, [LARGEST, 1.0 - LARGEST])))
-    spikes = distance > max(SPIKE_FACTOR * usual, MIN_SPIKE_SHARE * span, np.finfo(float).tiny)
-    return np.where(spikes, middle, values), int(spikes.sum())
+    far = distance > max(SPIKE_FACTOR * usual, MIN_SPIKE_SHARE * span, np.finfo(float).tiny)
+    # What stays away for longer is a motion or a push: a structure wider than a spike opens none of it.
+    spikes = far & ~binary_opening(far, np.ones(MAX_SPIKE_SAMPLES + 1, dtype=bool))
+    place = np.arange(len(values))
+    return np.interp(place, place[~spikes], values[~spikes]), int(spikes.sum())
 
 
 def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: float) -> MotionScale:

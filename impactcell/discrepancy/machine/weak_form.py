@@ -202,6 +202,12 @@ def smoothed_acceleration(position: Samples, half: int, step: float) -> Samples:
     return np.convolve(padded, curvature, "valid")
 
 
+def averaged(values: Samples, half: int, step: float) -> Samples:
+    """Mean of a signal as the rows of the regression have it, shape (n,)."""
+    weight, _ = _test_function(half, step)
+    return np.convolve(np.pad(values, half + 1, mode="reflect"), weight, "valid")
+
+
 def _test_function(half: int, step: float) -> tuple[Samples, Samples]:
     """Weights of a mean, and of the mean second derivative by second differences, shape (2 half + 3,)."""
     place = np.arange(-half - 1, half + 2) / (half + 1.0)

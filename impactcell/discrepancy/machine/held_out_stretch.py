@@ -1,0 +1,112 @@
+"""What a held-out stretch itself has to say before a model runs on it: first state, and constant force.
+
+Neither is of the machine. Both are the stretch's own for every model that is simulated on it.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from impactcell.discrepancy.machine.base_model import BaseModel, Response
+from impactcell.records import Samples
+
+START_SAMPLES = 5
+"""Samples at either side by which the first speed is looked for at first [samples]."""
+START_PERIODS = 1.0
+"""Periods of the motion, or a quarter of a stretch, by which its first state is fitted."""
+START_NUDGE = 1e-3
+"""Size of the nudges that tell how a motion follows from its first state, over its range."""
+PULLING_BACK = frozenset(("restoring_force", "hardening_spring"))
+"""Terms that bring a part back to a place."""
+OFFSET_NUDGE = 1e-3
+"""Constant force that tells how far a motion drifts by one, over the largest of the drive."""
+OFFSET_STEPS = 2
+"""Runs by which it is found, before the first state is fitted and after; but for friction drift is linear."""
+
+
+def first_state(position: Samples, step: float) -> tuple[float, float]:
+    """Position and speed at the first sample, by a parabola."""
+    time = step * np.arange(4 * START_SAMPLES + 1)
+    curve = np.polynomial.Polynomial.fit(time, position[: len(time)], 3)
+    return float(curve(0.0)), float(curve.deriv()(0.0))
+
+
+def settled_start(
+    run: Callable[[Samples], Samples], start: Samples, measured: Sequence[Samples], begin: Sequence[int]
+) -> Samples:
+    """First states, shape (2, lanes), by least squares of a model over the begin of each stretch.
+
+    The speed that a few samples show errs by more than the model does; one Gauss-Newton step from it.
+    """
+    reached = [float(np.ptp(values)) for values in measured]
+    nudge = START_NUDGE * np.array([reached, reached])
+    nudge[1] *= np.abs(start[1]).max() / max(*reached, np.finfo(float).tiny) + 1.0
+    plain = run(start)
+    moved = [run(start + nudge * np.array([[1.0 - axis], [axis]])) - plain for axis in (0.0, 1.0)]
+    settled = start.copy()
+    for lane, (values, count) in enumerate(zip(measured, begin, strict=True)):
+        slopes = np.stack([change[:count, lane] for change in moved], axis=1)
+        left = values[:count] - plain[:count, lane]
+        step = np.linalg.lstsq(slopes, left, rcond=1e-6)[0] * nudge[:, lane]
+        settled[:, lane] += step
+    after = run(settled)
+    for lane, (values, count) in enumerate(zip(measured, begin, strict=True)):
+        errors = [float(np.sum((values[:count] - out[:count, lane]) ** 2)) for out in (plain, after)]
+        if not errors[1] < errors[0]:
+            settled[:, lane] = start[:, lane]
+    return settled
+
+
+def drifts(base: BaseModel) -> bool:
+    """Whether a constant force adds up in a simulated position, and the base model leaves it open.
+
+    Nothing pulls back then: what the zero of the force moves between two records, tenths of a per cent of it,
+    carries the part away, and says nothing of any term.
+    """
+    pulls = not (base.gravity_torque.is_held and base.gravity_torque.value == 0.0)
+    pulls = pulls or any(choice.identifier in PULLING_BACK or choice.law for choice in base.terms)
+    return base.response is Response.POSITION and not base.force_offset.is_held and not pulls
+
+
+def constant_forces(
+    run: Callable[[Samples], Samples],
+    drives_and_measured: tuple[Sequence[Samples], Sequence[Samples]],
+    constant: Samples,
+    reach: float,
+) -> Samples:
+    """Constant force of each lane by least squares of its positions, shape (lanes,).
+
+    Parameters
+    ----------
+    run : callable
+        Positions (samples, 2 lanes) under constant forces of shape (2 lanes,): every lane twice.
+    drives_and_measured : (sequence, sequence) of ndarray
+        Force and position of each lane.
+    constant : ndarray, shape (lanes,)
+        Where to begin.
+    reach : float
+        How large it may be [N or N m].
+    """
+    drives, measured = drives_and_measured
+    lanes = len(measured)
+    nudge = OFFSET_NUDGE * np.array([float(np.abs(drive).max()) for drive in drives])
+    best, least = constant, np.full(lanes, np.inf)
+    for _ in range(OFFSET_STEPS):
+        both = run(np.concatenate([constant, constant + nudge]))
+        plain, slopes = both[:, :lanes], (both[:, lanes:] - both[:, :lanes]) / nudge
+        squares = _squares(plain, measured)
+        best, least = np.where(squares < least, constant, best), np.minimum(squares, least)
+        step = np.zeros(lanes)
+        for lane, values in enumerate(measured):
+            slope = slopes[: len(values), lane]
+            left = float(slope @ (values - plain[: len(values), lane]))
+            step[lane] = left / max(float(slope @ slope), np.finfo(float).tiny)
+        constant = np.clip(constant + step, -reach, reach)
+    return best
+
+
+def _squares(out: Samples, measured: Sequence[Samples]) -> Samples:
+    """Squared error of each lane."""
+    return np.array(
+        [float(np.sum((values - out[: len(values), lane]) ** 2)) for lane, values in enumerate(measured)]
+    )
