@@ -14,6 +14,7 @@ from impactcell.discrepancy.report import (
     german_sentences,
     machine_sentences,
 )
+from impactcell.discrepancy.report.simulation_notes import DRIFTS
 from impactcell.german.findings import with_decimal_commas
 from impactcell.quality import DataFault, Fault, channel_faults, motion_faults, notes_of
 from impactcell.quality import campaigns as campaign_faults
@@ -105,7 +106,7 @@ def test_notes_on_a_machine_are_said_in_german() -> None:
     alike = "periodic force, covariate friction(oil): on these records like inertia, gravity or drive, and so"
     beside = "covariate_friction(oil) shows only beside quadratic_drag, which hides it on these records;"
     off = "Simulated open loop, held-out records are 0.2 N m off with it, 0.1 without."
-    notes += [f"{alike} not looked for.", f"{beside} quadratic_drag is not named.", off]
+    notes += [f"{alike} not looked for.", f"{beside} quadratic_drag is not named.", off, DRIFTS]
     for note in notes:
         assert german_sentences.note(note)[0] == "de", note
 

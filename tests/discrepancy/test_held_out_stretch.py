@@ -15,6 +15,7 @@ from impactcell.discrepancy.machine.held_out_stretch import constant_forces, dri
 from impactcell.discrepancy.machine.regression import LinearFit
 from impactcell.discrepancy.machine.selection import ChosenTerm
 from impactcell.discrepancy.machine.simulation import simulate_held_out
+from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.records import Capture
 from tests.discrepancy import test_ramped_axis as ramped
 
@@ -28,16 +29,16 @@ def _error_m(base: BaseModel) -> float:
     time = 1e-2 * np.arange(400)
     decay = np.exp(-VISCOUS * time / MASS)
     position = FORCE / VISCOUS * (time - MASS / VISCOUS * (1.0 - decay))
-    record: Any = SimpleNamespace(
-        time_s=time, position=position, force=np.full(time.size, FORCE - OFFSET), inertia=MASS,
-        covariates={"": 0.0}, step_s=1e-2,
+    record = UniformRecord(
+        shot=1, label="", time_s=time, position=position, force=np.full(time.size, FORCE - OFFSET),
+        inertia=MASS, covariates={}, spikes=0, noise=(0.0, 0.0),
     )  # fmt: skip
     viscous = ChosenTerm(TermChoice("viscous_friction"), 0.0)
     values = np.array([VISCOUS])
     fit = LinearFit(viscous.columns, values, values, values, np.array([False]))
     model = FittedModel(base, (viscous,), fit, 0.0, 0.0)
     finding: Any = SimpleNamespace(
-        held_spans=[(0, 0.0, 4.0)], records=[record], scale=SimpleNamespace(period_s=2.0)
+        held_spans=[(0, 0.0, 4.0)], records=[record], scale=SimpleNamespace(period_s=4.1)
     )
     return simulate_held_out(finding, model).rmse
 

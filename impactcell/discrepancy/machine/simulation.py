@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, OpenLoopError
@@ -118,12 +119,17 @@ def _positions(
     constant = np.zeros(len(records))
     adrift = drifts(model.base)
     if adrift:
-        beside = _runner(model, records * 2, drives * 2, period_s)
+        # A drift shows at the longest step that a simulation may have.
+        every = max(int(period_s / (STEPS_PER_PERIOD * max(record.step_s for record in records))), 1)
+        thin = [replace(record, time_s=record.time_s[::every]) for record in records]
+        pushes = [uniform_filter1d(drive, every, mode="nearest")[::every] for drive in drives]
+        places = [values[::every] for values in measured]
+        beside = _runner(model, thin * 2, pushes * 2, period_s)
 
         def settled(state: Samples, constant: Samples) -> Samples:
             return constant_forces(
-                lambda forces: beside(np.tile(state, 2), max(map(len, measured)), forces),
-                (drives, measured),
+                lambda forces: beside(np.tile(state, 2), max(map(len, places)), forces),
+                (pushes, places),
                 constant,
                 PRIOR_REACH * model.base.force_offset.std,
             )

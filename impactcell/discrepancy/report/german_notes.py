@@ -26,11 +26,6 @@ FAULTS: Final = {
     "presliding only": "nur Vorgleiten",
 }
 """Kinds of what is wrong with data."""
-ADDS_UP: Final = (
-    ": die Kräfte stimmen besser, aber eine kleine konstante Kraft, die sich von Messung zu Messung "
-    "unterscheidet, summiert sich auf"
-)
-"""Why positions may err more where forces agree better."""
 DATA_FAULTS: Final[Patterns] = (
     (r"the (\w+) is constant at (\S+): .*",
      lambda m: f"{phrase(m[1])} steht konstant auf {m[2]}: nicht angeschlossen, oder die falsche Spalte"),
@@ -112,9 +107,11 @@ NOTES: Final[Patterns] = (
     (r"(\S+) shows only beside (\S+), which hides it on these records; .*",
      lambda m: f"{term_name(m[1])} zeigt sich nur neben „{term_name(m[2])}“, das es auf diesen Messungen "
      f"verdeckt; „{term_name(m[2])}“ wird nicht genannt."),
-    (r"Simulated open loop, held-out records are (\S+ .+?) off with it, (\S+) without(:?).*\.",
-     lambda m: "Ohne Rückführung simuliert liegen zurückgehaltene Messungen "
-     f"mit ihm um {m[1]} daneben, ohne um {m[2]}{ADDS_UP if m[3] else ''}."),
+    (r"Nothing pulls back here, and the smallest constant force adds up: .*",
+     ("Hier zieht nichts zurück, und die kleinste konstante Kraft summiert sich auf: In der Simulation hat "
+      "jede zurückgehaltene Messung eine eigene, mit dem Genannten und ohne es.")),
+    (r"Simulated open loop, held-out records are (\S+ .+?) off with it, (\S+) without\.",
+     r"Ohne Rückführung simuliert liegen zurückgehaltene Messungen mit ihm um \1 daneben, ohne um \2."),
 )  # fmt: skip
 """Notes of campaigns, of noise floors and of machines."""
 REASONS: Final[Patterns] = (

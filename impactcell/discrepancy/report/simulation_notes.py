@@ -3,6 +3,12 @@
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine import MachineFinding, OpenLoopError, Response, drifts
 
+DRIFTS = (
+    "Nothing pulls back here, and the smallest constant force adds up: in the simulation each held-out "
+    "record has one of its own, with what is named and without."
+)
+"""What is said where the zero of the force is each held-out record's own."""
+
 
 def notes_of_simulation(finding: MachineFinding, errors: tuple[OpenLoopError, OpenLoopError]) -> list[str]:
     """Say what a simulation takes from held-out records, and where it errs more with what is named.
@@ -17,10 +23,7 @@ def notes_of_simulation(finding: MachineFinding, errors: tuple[OpenLoopError, Op
     base = finding.base
     notes = []
     if drifts(base):
-        notes.append(
-            "Nothing pulls back here, and the smallest constant force adds up: in the simulation each "
-            "held-out record has one of its own, with what is named and without."
-        )
+        notes.append(DRIFTS)
     if finding.established and after > before:
         force, position = ("N m", "rad") if base.coordinate is Coordinate.ROTATION else ("N", "m")
         unit = force if base.response is Response.FORCE else position
