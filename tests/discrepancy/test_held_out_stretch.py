@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from impactcell.campaign import Campaign, Excitation
-from impactcell.discrepancy.machine import BaseModel, NumberPrior, Response, TermChoice, investigate_machine
+from impactcell.discrepancy.machine import BaseModel, NumberPrior, Response, TermChoice
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.held_out_stretch import constant_forces, drifts
 from impactcell.discrepancy.machine.regression import LinearFit
@@ -88,6 +88,6 @@ def test_a_predicted_force_errs_by_no_more_than_the_model_where_the_part_is_ramp
     """Beside noise of 0.3 N a wave of 0.5 N is all that the model lacks; ramps are of 76 N."""
     base = replace(ramped.BASE, response=Response.FORCE)
     shots = [Capture(place, math.nan, math.nan, *ramped._record(place)) for place in (1, 2)]
-    finding = investigate_machine(Campaign(Excitation.DRIVEN, tuple(shots)), base, train="1", test="2")
+    finding = ramped.found(Campaign(Excitation.DRIVEN, tuple(shots)), base)
     assert finding.established == ("directional_viscous_friction",)
     assert simulate_held_out(finding, finding.final).rmse < 2.0
