@@ -106,6 +106,12 @@ def _state_6(content: dict[str, Tree]) -> dict[str, Tree]:
     return {**content, "cell": {**cell, "tracker": tracker}}
 
 
+def _state_7(content: dict[str, Tree]) -> dict[str, Tree]:
+    """Begin the banks under other models anew with the next cycle: none of them had a larger scatter."""
+    cell = content["cell"]
+    return {**content, "cell": {**cell, "tracker": {**cell["tracker"], "walk_models": None}}}
+
+
 def _alarm_2(content: dict[str, Tree]) -> dict[str, Tree]:
     """Numbers as such instead of in hexadecimal, members of enums by their values."""
     evidence = content["evidence"]
@@ -248,7 +254,14 @@ STATE_MIGRATIONS: Final = (
             "cell.gap.correlation",
         ),
     ),
+    Migration(
+        _state_7,
+        added={
+            "cell.tracker.noise.rescalings": 0.0,
+            "cell.tracker.replayed_noise.rescalings": 0.0,
+        },
+    ),
 )
-"""Of a cell's state: to format 2, 3, 4, 5 and 6. What earlier planners had not counted is nothing."""
+"""Of a cell's state: to format 2, 3, 4, 5, 6 and 7. What earlier planners had not counted is nothing."""
 ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)
 MODEL_MIGRATIONS: Final = (Migration(_model_2, renamed=_MODEL_2_RENAMED),)

@@ -21,9 +21,9 @@ from impactcell.tracking.wear_batch.settings import TrackerSettings
 if TYPE_CHECKING:
     from impactcell.tracking.wear_batch.state import UsableCycle
 
-IDENTIFIED_AT = (50, 100, 200)
+IDENTIFIED_AT = (50, 100)
 """Cycles after which random walks are looked for, before the end of commissioning."""
-REFITTED_AT = (4, 8, 12, *range(16, 200, 4), 250, 300, 400)
+REFITTED_AT = (4, 8, 12, *range(16, 200, 4))
 """Cycles after which a wrong scale of the noise is corrected."""
 RESCALED = 1.07
 """Factor by which it must have moved for the cycles to be gone over again."""

@@ -7,20 +7,23 @@ from impactcell.tracking.wear_batch import (
     batch_filter,
     noise_identification,
     noise_scale,
+    run_length_bank,
     walk_models,
 )
+from impactcell.tracking.wear_batch.batch_filter import BankUpdate
 from impactcell.tracking.wear_batch.noise_identification import CommissioningRecord
 from impactcell.tracking.wear_batch.settings import TrackerSettings
 from impactcell.tracking.wear_batch.state import TrackerState, UsableCycle
 
 
-def update_process_noise(
-    settings: TrackerSettings, state: TrackerState, cycle: UsableCycle
-) -> tuple[TrackerState, list[str]]:
-    """Commission the process noise from the first cycles, then let it follow the data; say what changed."""
-    if state.commissioning is None:
-        return _following(settings, state, cycle)
-    record = noise_identification.append_cycle(state.commissioning, cycle, cycle.observation.batch_id)
+def commission(
+    settings: TrackerSettings,
+    state: TrackerState,
+    cycle: UsableCycle,
+    commissioning: CommissioningRecord,
+) -> TrackerState:
+    """Commission the process noise from the first cycles."""
+    record = noise_identification.append_cycle(commissioning, cycle, cycle.observation.batch_id)
     cycles = len(record.rows)
     due = cycles - settings.commissioning_delay
     is_ended = due >= settings.commissioning_cycles
@@ -30,39 +33,44 @@ def update_process_noise(
         values, stds = record.rows[:, noise_identification.VALUE], record.rows[:, noise_identification.STD]
         state = replace(state, noise=noise_scale.refit(state.noise, values, stds))
     elif not identifies:
-        return state, []
-    return _replayed(settings, state, record, identifies=identifies), []
+        return state
+    return _replayed(settings, state, record, identifies=identifies)
 
 
-def _following(
-    settings: TrackerSettings, state: TrackerState, cycle: UsableCycle
-) -> tuple[TrackerState, list[str]]:
-    """Take a cycle into the banks under other walks, and believe the one that has become clearly likelier."""
+def compare_models(
+    settings: TrackerSettings, state: TrackerState, cycle: UsableCycle, updated: BankUpdate
+) -> tuple[TrackerState, UsableCycle, BankUpdate, list[str]]:
+    """Take a cycle, in the tracker's bank by now, into those of other models; believe one that is likelier.
+
+    Where a change is at hand they weigh it too. Gives back what is believed from this cycle on.
+    """
     if state.walk_models is None:
         believed = state.level_variance, state.slope_variance
         unit = noise_scale.usual_variance(state.noise)
-        begun = walk_models.begin(state.bank, state.outliers, believed, unit)
-        return replace(state, walk_models=begun), []
+        begun = walk_models.begin(updated.bank, updated.outliers, believed, unit)
+        return replace(state, walk_models=begun), cycle, updated, []
+    models = walk_models.append(state.walk_models, batch_filter.bank_measurement(cycle))
+    is_at_hand = updated.statistic > run_length_bank.threshold(settings.false_alarm_cycles)
+    if len(models.cycles) < walk_models.TOGETHER and not is_at_hand:
+        return replace(state, walk_models=models), cycle, updated, []
+    log_odds = noise_scale.log_odds_of_growth(cycle.noise)
     model = batch_filter.bank_model(settings, state, cycle)
-    before = state.walk_models.believed
-    models = walk_models.update(
-        state.walk_models, batch_filter.bank_measurement(cycle), model, state.accepted
-    )
-    state = replace(state, walk_models=models)
-    if models.believed == before:
-        return state, []
-    bank, outliers = models.banks[models.believed], models.outliers[models.believed].tolist()
-    level, slope = models.variances[models.believed].tolist()
-    believing = replace(
-        state,
-        bank=bank,
-        outliers=(outliers[0], outliers[1]),
-        change_point=batch_change_detection.refined_change_point(state, bank),
-        level_variance=level,
-        slope_variance=slope,
-    )
+    taken, statistic = walk_models.take_in(models, model, state.accepted, log_odds)
+    models, updated = walk_models.believing(taken, log_odds), replace(updated, statistic=statistic)
+    place = models.believed
+    if place == taken.believed:
+        return replace(state, walk_models=models), cycle, updated, []
+    seen, cycles = models.outliers[place].tolist()
+    updated = replace(updated, bank=models.banks[place], outliers=(seen, cycles))
+    level, slope, scatter = models.variances[place].tolist()
+    if scatter > 1.0:
+        noise = noise_scale.rescaled(cycle.noise, scatter)
+        cycle = replace(cycle, noise=noise, variance=noise_scale.variance(noise, cycle.std))
+        return replace(state, walk_models=None), cycle, updated, []
     how = "steadily" if level == slope == 0.0 else "unsteadily"
-    return believing, [f"friction is found to go {how} from cycle to cycle, the past is seen so from here on"]
+    note = f"friction is found to go {how} from cycle to cycle, the past is seen so from here on"
+    state = replace(state, walk_models=models, level_variance=level, slope_variance=slope)
+    return state, cycle, updated, [note]
 
 
 def _replayed(

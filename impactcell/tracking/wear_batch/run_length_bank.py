@@ -122,9 +122,18 @@ def update(
 ) -> BankResult:
     """Take one measurement as `take`, and say what it makes of a change after the last that was accepted."""
     count, density, outlier_share = take(bank, count, model, measurement, outliers, accepted)
-    since = max(accepted, measurement.cycle + measurement.lag - WINDOW)
-    statistic = run_length_update.shiryaev_roberts(bank, count, since, model.hazard, model.slope_prior)
+    changed, unchanged = change_weights(bank, count, model, measurement, accepted)
+    statistic = changed - unchanged - math.log(model.hazard) if unchanged > -np.inf else np.inf
     return BankResult(count, density, statistic, outlier_share)
+
+
+@compiled
+def change_weights(
+    bank: Bank, count: int, model: BankModel, measurement: Measurement, accepted: float
+) -> tuple[float, float]:
+    """Log weights of a change since the last that was accepted, and of none, after a measurement."""
+    since = max(accepted, measurement.cycle + measurement.lag - WINDOW)
+    return run_length_update.change_weights(bank, count, since, model.slope_prior)
 
 
 @compiled

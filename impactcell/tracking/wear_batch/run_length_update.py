@@ -275,15 +275,13 @@ def slope_evidence(mean: float, variance: float, prior: float) -> float:
 
 
 @compiled
-def shiryaev_roberts(bank: Bank, count: int, since: float, hazard: float, slope_prior: float) -> float:
-    """Shiryaev-Roberts log statistic: changed after `since` against not, the prior odds taken out."""
+def change_weights(bank: Bank, count: int, since: float, slope_prior: float) -> tuple[float, float]:
+    """Log weights of all that say a change came after `since`, and of all that say none did."""
     split = 0
     while split < count and bank[split].change_cycle <= since:
         split += 1
-    if split == 0 or split == count:
-        return -np.inf if split == count else np.inf
     weighted = np.empty(count, bank.dtype)
     for i in range(count):
         evidence = slope_evidence(bank[i].mean[SLOPE], bank[i].covariance[SLOPE, SLOPE], slope_prior)
         weighted[i].log_weight = bank[i].log_weight + evidence
-    return log_sum_exp(weighted, split, count) - log_sum_exp(weighted, 0, split) - math.log(hazard)
+    return log_sum_exp(weighted, split, count), log_sum_exp(weighted, 0, split)

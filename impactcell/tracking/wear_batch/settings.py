@@ -39,7 +39,8 @@ class TrackerSettings:
     outlier_threshold : float
         Huber's threshold, in standard deviations of the innovation.
     commissioning_cycles : int
-        Cycles from which the process noise is learned.
+        Cycles from which the process noise is learned; what they do not show, the banks that run side by side
+        from then on will.
     commissioning_delay : int
         By so many cycles random walks are looked for later than else, and commissioning ends later. What is
         found there takes as long as several cycles; cells of one service that were begun together would all
@@ -62,7 +63,7 @@ class TrackerSettings:
     slope_std: float = 0.1
     outlier_probability: float = 0.001
     outlier_threshold: float = 2.5
-    commissioning_cycles: int = 500
+    commissioning_cycles: int = 200
     commissioning_delay: int = 0
     level_noise: float = 0.0
     slope_noise: float = 0.0

@@ -9,13 +9,13 @@ from impactcell.tracking.wear_batch import (
     input_validation,
     noise_identification,
     noise_scale,
+    process_noise,
     run_length_bank,
     wear_blocks,
     wear_filter,
 )
 from impactcell.tracking.wear_batch.batch_filter import BankUpdate
 from impactcell.tracking.wear_batch.input_validation import CycleTiming
-from impactcell.tracking.wear_batch.process_noise import update_process_noise
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.wear_batch.state import (
     ANNOUNCED,
@@ -87,21 +87,23 @@ def update(
         notes.append("the batch id changes too often to say anything of batches")
     cycle = UsableCycle(observation, timing, noise, std, variance, announced)
     updated = batch_filter.update_bank(settings, state, cycle)
+    if state.commissioning is None and timing.lag == 0:
+        state, cycle, updated, raised = process_noise.compare_models(settings, state, cycle, updated)
+        notes.extend(raised)
     before, change = batch_change_detection.detect_change(settings, state, cycle, updated)
     state, known, change, innovation = _update_filter(settings, before, cycle, updated, change)
     state = replace(
         state,
         clock=clock,
-        noise=noise,
+        noise=cycle.noise,
         filter=known,
         bank=updated.bank,
         outliers=updated.outliers,
         change_point=batch_change_detection.refined_change_point(state, updated.bank),
         wear_blocks=batch_filter.update_blocks(settings, state, cycle, updated),
     )
-    if timing.lag == 0:
-        state, raised = update_process_noise(settings, state, cycle)
-        notes.extend(raised)
+    if state.commissioning is not None and timing.lag == 0:
+        state = process_noise.commission(settings, state, cycle, state.commissioning)
     is_expected = announced > 0.0 and observation.expected_change
     outcome = CycleOutcome(notes, used=True, change=change, innovation=innovation, expected=is_expected)
     return _report(settings, state, observation, outcome)

@@ -1,12 +1,16 @@
-"""Does the level walk, or its slope? Banks under several random walks run beside it; the likelier is taken.
+"""Does the level walk, or its slope, or has the scatter grown? Banks that say so run beside the tracker's.
 
 Multiple-model estimation (Magill 1965, IEEE Trans. Autom. Control 10:434): each bank gives the density of
 every cycle before it is seen. Batch changes and outliers are averaged over in all of them, so that neither
-passes for a walk, nor a walk for changes. The log densities over those of the walk that is believed are
+passes for a walk, nor a walk for changes. The log densities over those of the model that is believed are
 cumulated from zero up, as in Page's CUSUM of a likelihood ratio (1954, Biometrika 41:100): a walk that begins
-or ends is found, however long there was none before.
+or ends, or a scatter that grows, is found, however long there was none before.
+
+Where the scatter grows a change of batch is the first that comes to the tracker's own bank, well before the
+scale of the noise has followed. So a change is weighed under both scatters, each with its probability.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,21 +22,29 @@ from impactcell.tracking.wear_batch.run_length_model import BankModel, Measureme
 WALKS = ((0.0, 0.0), (0.03, 0.0), (0.1, 0.0), (0.0, 2e-4), (0.0, 1e-3))
 """Walks that are compared: standard deviations a cycle of level and slope, in those of one estimate. A level
 that swings slowly is likelier under a slope that walks."""
+GROWN = 2.0
+"""Factor by which the scatter may have grown."""
 CLEARLY = 6.0
 """Nats by which another walk must have become more likely: of white scatter 3.6 at most in 160 000 cycles, of
 batches of 300 cycles 6.9."""
+CERTAINLY = 2.3
+"""Nats by which a larger scatter must be more probable to be believed: ten to one."""
 TOGETHER = 32
-"""Cycles that are taken in at a time: no alarm waits for them."""
+"""Cycles that are taken in at a time, unless an alarm waits for them."""
+
+VARIANCE = Measurement._fields.index("variance")
+"""Its column among the cycles that are kept."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkModels:
-    """Banks under other walks, and how much more likely each has become.
+    """Banks under other walks and a larger scatter, and how much more likely each has become.
 
     Attributes
     ----------
-    variances : ndarray, shape (k, 2)
-        Of the walks of level and slope, a cycle.
+    variances : ndarray, shape (k, 3)
+        Of the walks of level and slope, a cycle; of an estimate, over what it is believed to be. The last is
+        the model whose scatter has grown.
     believed : int
         Place of the one that the tracker believes.
     banks : tuple of ndarray, shapes (n, 22)
@@ -63,7 +75,8 @@ def begin(
         Variance of one estimate.
     """
     others = [(level**2 * unit, slope**2 * unit) for level, slope in WALKS]
-    variances = np.array([believed, *(other for other in others if other != believed)])
+    walks = [believed, *(other for other in others if other != believed)]
+    variances = np.array([*((*walk, 1.0) for walk in walks), (*believed, GROWN**2)])
     count = len(variances)
     return WalkModels(
         variances,
@@ -75,8 +88,13 @@ def begin(
     )
 
 
-def update(models: WalkModels, measurement: Measurement, model: BankModel, accepted: int) -> WalkModels:
-    """Take a cycle in; another walk is `believed` from it on where that has become clearly more likely.
+def append(models: WalkModels, measurement: Measurement) -> WalkModels:
+    """Keep a cycle, to be taken in with others."""
+    return replace(models, cycles=np.vstack([models.cycles, measurement]))
+
+
+def take_in(models: WalkModels, model: BankModel, accepted: int, log_odds: float) -> tuple[WalkModels, float]:
+    """Take in the cycles that were kept, one at least.
 
     Parameters
     ----------
@@ -84,28 +102,54 @@ def update(models: WalkModels, measurement: Measurement, model: BankModel, accep
         What all banks assume beside the walks.
     accepted : int
         See `TrackerState`.
+    log_odds : float
+        Of a scatter that grows against one that does not, a cycle, before it is seen; nats.
+
+    Returns
+    -------
+    models : WalkModels
+    statistic : float
+        Shiryaev-Roberts log statistic of a batch change since, whether or not the scatter has grown.
     """
-    cycles = np.vstack([models.cycles, measurement])
-    if len(cycles) < TOGETHER:
-        return replace(models, cycles=cycles)
     # the first row of a series is in the bank already
-    series = np.vstack([cycles[:1], cycles])
-    banks, outliers, log_densities = [], models.outliers.copy(), np.zeros(len(models.variances))
-    for place, (rows, (level, slope)) in enumerate(zip(models.banks, models.variances.tolist(), strict=True)):
+    series = np.vstack([models.cycles[:1], models.cycles])
+    newest = Measurement(*models.cycles[-1].tolist())
+    banks, outliers = [], models.outliers.copy()
+    log_densities, changed, unchanged = np.zeros((3, len(models.variances)))
+    for place, rows in enumerate(models.banks):
         bank = run_length_bank.workspace(rows)
+        level, slope, scatter = models.variances[place].tolist()
         walking = model._replace(level_variance=level, slope_variance=slope)
+        scattered = series.copy()
+        scattered[:, VARIANCE] *= scatter
         count, log_densities[place] = run_length_bank.update_series(
-            bank, len(rows), walking, series, outliers[place], float(accepted)
+            bank, len(rows), walking, scattered, outliers[place], float(accepted)
         )
         banks.append(run_length_bank.stored(bank, count))
+        changed[place], unchanged[place] = run_length_bank.change_weights(
+            bank, count, model, newest, float(accepted)
+        )
     evidence = np.maximum(models.evidence + log_densities - log_densities[models.believed], 0.0)
-    likeliest = int(np.argmax(evidence))
-    has_changed = evidence[likeliest] > CLEARLY
-    return WalkModels(
-        models.variances,
-        likeliest if has_changed else models.believed,
-        tuple(banks),
-        outliers,
-        np.zeros_like(evidence) if has_changed else evidence,
-        cycles[:0],
+    taken = replace(
+        models, banks=tuple(banks), outliers=outliers, evidence=evidence, cycles=models.cycles[:0]
     )
+    weighed = [models.believed, len(evidence) - 1]
+    weights = np.array([0.0, evidence[-1] + log_odds])
+    statistic = float(
+        np.logaddexp.reduce(changed[weighed] + weights) - np.logaddexp.reduce(unchanged[weighed] + weights)
+    ) - math.log(model.hazard)
+    return taken, statistic
+
+
+def believing(models: WalkModels, log_odds: float) -> WalkModels:
+    """Believe the model that has become clearly more likely, if one has."""
+    bounds = np.full(len(models.evidence), CLEARLY)
+    bounds[-1] = CERTAINLY - log_odds
+    likeliest = int(np.argmax(models.evidence - bounds))
+    if models.evidence[likeliest] <= bounds[likeliest]:
+        return models
+    variances = models.variances.copy()
+    variances[-1, :-1] = variances[
+        likeliest, :-1
+    ]  # a scatter that grows does so beside the walk that is believed
+    return replace(models, variances=variances, believed=likeliest, evidence=np.zeros_like(models.evidence))

@@ -1,5 +1,7 @@
 """Walks of level and slope: found, and ended, by the likelihood of banks that run side by side."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,9 +11,11 @@ from impactcell.tracking.wear_batch import (
     BatchKnowledge,
     FrictionObservation,
     TrackerSettings,
+    noise_scale,
     run_length_bank,
     walk_models,
 )
+from impactcell.tracking.wear_batch.noise_scale import NoiseScale
 from impactcell.tracking.wear_batch.run_length_model import BankModel, Measurement
 
 UNIT = 0.002
@@ -19,6 +23,10 @@ SETTINGS = TrackerSettings(batch=BatchKnowledge.UNKNOWN)
 MODEL = BankModel(
     SETTINGS.hazard, SETTINGS.step_std**2, 0.0, 0.0, SETTINGS.outlier_probability, SETTINGS.slope_std**2
 )
+
+
+NEVER = -np.inf
+"""Log odds of a scatter that grows, where it is not to be looked for."""
 
 
 def white(seed, cycles):
@@ -46,10 +54,19 @@ def believed(values):
     models = walk_models.begin(first_bank(values[0]), (0.0, 0.0), (0.0, 0.0), 1.0)
     found = [(0.0, 0.0)]
     for cycle, value in enumerate(values[1:], 1):
-        models = walk_models.update(models, measurement(value, cycle), MODEL, 0)
-        level, slope = np.sqrt(models.variances[models.believed])
+        models, _ = taken_in(models, value, cycle)
+        models = walk_models.believing(models, NEVER)
+        level, slope, _ = np.sqrt(models.variances[models.believed])
         found.append((float(level), float(slope)))
     return found
+
+
+def taken_in(models, value, cycle, log_odds=NEVER):
+    """Models with a cycle in them, and the statistic of a change where they were brought up to date."""
+    models = walk_models.append(models, measurement(value, cycle))
+    if len(models.cycles) < walk_models.TOGETHER:
+        return models, None
+    return walk_models.take_in(models, MODEL, 0, log_odds)
 
 
 def test_the_evidence_is_how_much_more_likely_the_cycles_are_under_another_walk():
@@ -57,16 +74,15 @@ def test_the_evidence_is_how_much_more_likely_the_cycles_are_under_another_walk(
     models = walk_models.begin(first_bank(values[0]), (0.0, 0.0), (0.0, 0.0), 1.0)
     for cycle, value in enumerate(values[1:], 1):
         assert not np.any(models.evidence)
-        models = walk_models.update(models, measurement(value, cycle), MODEL, 0)
+        models, _ = taken_in(models, value, cycle)
     likelihoods = []
-    for level, slope in walk_models.WALKS:
+    for level, slope, scatter in (*((*walk, 1.0) for walk in walk_models.WALKS), (0.0, 0.0, 2.0)):
         bank, outliers = run_length_bank.workspace(first_bank(values[0])), np.zeros(2)
         count, total = 2, 0.0
         model = MODEL._replace(level_variance=level**2, slope_variance=slope**2)
         for cycle, value in enumerate(values[1:], 1):
-            count, density, _, _ = run_length_bank.update(
-                bank, count, model, measurement(value, cycle), outliers, 0.0
-            )
+            seen = measurement(value, cycle)._replace(variance=scatter**2)
+            count, density, _, _ = run_length_bank.update(bank, count, model, seen, outliers, 0.0)
             total += density
         likelihoods.append(total)
         np.testing.assert_allclose(
@@ -97,9 +113,10 @@ def test_a_level_that_swings_is_a_slope_that_walks():
 
 def test_the_walk_that_was_commissioned_is_among_those_that_are_compared():
     models = walk_models.begin(first_bank(0.0), (0.0, 0.0), (0.01**2, 0.0), 1.0)
-    assert models.variances[models.believed].tolist() == [0.01**2, 0.0]
-    assert len(models.variances) == len(walk_models.WALKS) + 1
-    assert len(walk_models.begin(first_bank(0.0), (0.0, 0.0), (0.0, 0.0), 1.0).variances) == len(
+    assert models.variances[models.believed].tolist() == [0.01**2, 0.0, 1.0]
+    assert models.variances[-1].tolist() == [0.01**2, 0.0, 4.0]
+    assert len(models.variances) == len(walk_models.WALKS) + 2
+    assert len(walk_models.begin(first_bank(0.0), (0.0, 0.0), (0.0, 0.0), 1.0).variances) == 1 + len(
         walk_models.WALKS
     )
 
@@ -129,6 +146,77 @@ def test_the_tracker_takes_the_bank_of_the_walk_that_it_believes(knowledge):
     assert "unsteadily" in note
     assert cycle < 2000
     assert state.walk_models is not None
-    level, slope = state.walk_models.variances[state.walk_models.believed]
+    level, slope, _ = state.walk_models.variances[state.walk_models.believed]
     assert (state.level_variance, state.slope_variance) == (level, slope)
     assert slope > 0.0
+
+
+def bank_of(values, variance):
+    """The bank alone after all but the first of the values, and the log likelihood of them."""
+    bank, count, outliers, total = run_length_bank.workspace(first_bank(values[0])), 2, np.zeros(2), 0.0
+    for cycle, value in enumerate(values[1:], 1):
+        seen = measurement(value, cycle)._replace(variance=variance)
+        count, density, *_ = run_length_bank.update(bank, count, MODEL, seen, outliers, 0.0)
+        total += density
+    return bank, count, total
+
+
+def test_a_change_is_weighed_under_both_scatters_by_how_probable_they_are():
+    values = np.append(white(9, 13), 2.5 * white(10, walk_models.TOGETHER - 12))
+    models, statistic = walk_models.begin(first_bank(values[0]), (0.0, 0.0), (0.0, 0.0), 1.0), None
+    for cycle, value in enumerate(values[1:], 1):
+        models, statistic = taken_in(models, value, cycle, np.log(1e-3))
+    odds, likelihoods = [], []
+    for variance in (1.0, 4.0):
+        bank, count, likelihood = bank_of(values, variance)
+        changed, unchanged = run_length_bank.change_weights(
+            bank, count, MODEL, measurement(values[-1], walk_models.TOGETHER), 0.0
+        )
+        odds.append(np.exp([changed, unchanged]))
+        likelihoods.append(likelihood)
+    grown = 1e-3 * np.exp(max(likelihoods[1] - likelihoods[0], 0.0))
+    changed, unchanged = odds[0] + grown * odds[1]
+    assert grown > 0.1
+    assert statistic == pytest.approx(np.log(changed / unchanged / MODEL.hazard), rel=1e-9)
+
+
+def test_a_larger_scatter_is_believed_where_it_is_ten_times_as_probable():
+    models = walk_models.begin(first_bank(0.0), (0.0, 0.0), (0.0, 0.0), 1.0)
+    last = len(models.variances) - 1
+    for nats, expected in ((2.2, 0), (2.4, last)):
+        evidence = np.append(np.zeros(last), nats - np.log(1e-4))
+        likelier = walk_models.believing(replace(models, evidence=evidence), np.log(1e-4))
+        assert likelier.believed == expected
+
+
+def test_a_scatter_grows_beside_the_walk_that_is_believed():
+    models = walk_models.begin(first_bank(0.0), (0.0, 0.0), (0.0, 0.0), 1.0)
+    evidence = np.array([0.0, 0.0, 10.0, 0.0, 0.0, 0.0])
+    walking = walk_models.believing(replace(models, evidence=evidence), NEVER)
+    assert walking.believed == 2
+    np.testing.assert_allclose(walking.variances[-1], [0.1**2, 0.0, 4.0])
+    assert not walking.evidence.any()
+
+
+def test_a_scatter_that_doubles_is_soon_believed_and_told_of_no_batch():
+    """Weighed under the scatter of before alone there were nine changes of batch in these."""
+    for seed in range(17, 24):
+        state, values, found = wear_batch.initial_state(), white(seed, 400), 0
+        values[330:] *= 2.0
+        for cycle, value in enumerate(0.2 + UNIT * values):
+            done = wear_batch.update(SETTINGS, state, FrictionObservation(cycle, value, UNIT))
+            state = done.state
+            found += done.shift is not None
+        assert found == 0
+        assert 1.5 < np.sqrt(noise_scale.usual_variance(state.noise)) / UNIT < 3.0
+
+
+def test_the_more_often_the_scatter_has_changed_the_sooner_it_is_asked():
+    noise = NoiseScale()
+    assert np.exp(noise_scale.log_odds_of_growth(noise)) == pytest.approx(noise_scale.GROWTH)
+    grown = noise_scale.rescaled(noise_scale.rescaled(noise, 4.0), 0.25)
+    assert grown.factor == noise.factor
+    assert np.exp(noise_scale.log_odds_of_growth(grown)) == pytest.approx(noise_scale.GROWTH + 2.0 / 5000.0)
+    for cycle in range(1000):
+        grown, _ = noise_scale.update(grown, 0.2 + 0.001 * (cycle % 2), UNIT, late=False, other_batch=False)
+    assert grown.rescalings <= 2.0 * (1.0 - 1.0 / 5000.0) ** 1000 + 1.0
