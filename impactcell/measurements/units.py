@@ -211,7 +211,7 @@ def _suffix(text: str) -> tuple[str, str | None]:
         unit = {"Nm": "Nm", "kgm2": "kgm2", "m/s": "m/s", "ms": "ms", "m/s2": "m/s2"}.get(unit, unit)
         if count == 2 and tail in (["m", "s"], ["rad", "s"], ["mm", "s"]):
             unit = "/".join(tail)
-        # `u_in` is what goes in; where inches are meant, `pos_inch` says so.
+        # What is called "u_in" goes in; where inches are meant, the name ends in "inch".
         if parse_unit(unit) and parts[0] and unit not in ("1", "t", "h", "in"):
             return "_".join(parts[:-count]), unit
     return text, None

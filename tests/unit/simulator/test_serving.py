@@ -34,7 +34,7 @@ def test_the_scenarios_that_come_with_it(name: str) -> None:
     ("text", "place", "message"),
     [
         ("", "1:1", "is empty"),
-        ("format: 1\n  x: 2\n", "2:4", "not allowed here"),
+        ("format: 1\n  x: 2\n", "2:4", "indent the line as its neighbours"),
         ("format: 1\nformat: 1\n", "2:1", "is given twice"),
         ("format: 1\nstrikes: {period_s: 1}\n", "1:1", "'register_map' is missing"),
         ("format: 1\nregister_map: m.yaml\n", "1:1", "give either `strikes`"),
