@@ -1,7 +1,5 @@
 """What a channel shows by itself: spikes, plateaus at its end, samples that are missing or stuck."""
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
@@ -78,7 +76,8 @@ def _plateaus(name: str, channel: Channel, shot: int) -> list[DataFault]:
     if name == "actuator" or noise_of(values) == 0.0:
         return []  # an actuator halts, and without noise rest is a plateau
     starts, lengths = _equal_runs(values)
-    is_coarse = (raster_of(values) or 0.0) > white_noise_std(values)  # there, too
+    # Where noise is less than a step of the raster, rest is a plateau too.
+    is_coarse = (raster_of(values) or 0.0) > white_noise_std(values)
     if is_coarse and name != "force":
         return []
     data_faults = []
@@ -87,11 +86,13 @@ def _plateaus(name: str, channel: Channel, shot: int) -> list[DataFault]:
     for end, word in ((float(values.max()), "upper"), (float(values.min()), "lower")):
         at_end = values[starts] == end
         longest = int(lengths[at_end].max(initial=0))
+        if longest < MIN_PLATEAU or end == 0.0:
+            continue
         if name == "force" and word == "upper":
             is_flat = is_cut_off(values, longest)
         else:
             is_flat = not is_coarse and longest > PLATEAU_FACTOR * elsewhere
-        if longest >= MIN_PLATEAU and is_flat and math.fabs(end) > 0.0:
+        if is_flat:
             start = int(starts[at_end][lengths[at_end].argmax()])
             told = (
                 f"the {name} stands at its {word} end, {end:.6g}, for {longest} samples from "

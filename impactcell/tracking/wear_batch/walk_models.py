@@ -149,7 +149,6 @@ def believing(models: WalkModels, log_odds: float) -> WalkModels:
     if models.evidence[likeliest] <= bounds[likeliest]:
         return models
     variances = models.variances.copy()
-    variances[-1, :-1] = variances[
-        likeliest, :-1
-    ]  # a scatter that grows does so beside the walk that is believed
+    # A scatter that grows does so beside the walk that is believed.
+    variances[-1, :-1] = variances[likeliest, :-1]
     return replace(models, variances=variances, believed=likeliest, evidence=np.zeros_like(models.evidence))
