@@ -134,6 +134,8 @@ class Device:
             return self._parts.due_s
         if strikes.cycles is not None and self._made >= strikes.cycles:
             return math.inf
+        if strikes.ahead is not None and self._image.unacknowledged >= strikes.ahead:
+            return math.inf
         return max(self._next_s, self._rested_s)
 
     def _step(self) -> None:
@@ -145,7 +147,8 @@ class Device:
             self._parts.advance(self._now_s)
             self._show_part()
         else:
-            self._next_s += strikes.period_s
+            # A strike that had to wait is not made up for.
+            self._next_s = (self._next_s if strikes.ahead is None else self._now_s) + strikes.period_s
             self._strike(scheduled_tap(self.scenario, strikes, self._made), sequence=0)
 
     def _strike(self, commanded: TapInput, sequence: int) -> None:
@@ -283,7 +286,7 @@ class Device:
 
     def set_counter(self, value: int) -> None:
         """Go on counting after `value`."""
-        self._image.put("cycle_counter", value)
+        self._image.count_from(value)
 
     def busy(self, seconds: float) -> None:
         """Refuse every request for so many of the module's seconds."""

@@ -18,6 +18,7 @@ class RegisterImage:
         self.session = session
         self._image = ScriptedDevice(registers, session)
         self._overwritten = 0
+        self._acknowledged = 0
 
     def put(self, name: str, value: Any) -> None:
         """Show a value."""
@@ -37,8 +38,14 @@ class RegisterImage:
         self._image.write(address, words, table)
         for session, cycle in self._image.acknowledged:
             if session == int(self.get("session")) and cycle:
+                self._acknowledged = cycle
                 self.put("acknowledged_cycle", cycle)
         self._image.acknowledged.clear()
+
+    @property
+    def unacknowledged(self) -> int:
+        """How many cycles have been made since the one that was acknowledged last."""
+        return (int(self.get("cycle_counter")) - self._acknowledged) % LAST_CYCLE
 
     def complete(self, samples: Mapping[str, NDArray[np.float64]], header: Mapping[str, float | str]) -> int:
         """Put a cycle into the ring, counting the one that has to leave for it; returns its number."""
@@ -52,9 +59,14 @@ class RegisterImage:
         in_map = {name: value for name, value in header.items() if name in self.registers}
         return self._image.complete(samples, **in_map)
 
+    def count_from(self, cycle: int) -> None:
+        """Go on counting after `cycle`; what was made before is waited for no longer."""
+        self.put("cycle_counter", cycle)
+        self._acknowledged = cycle
+
     def restart(self) -> int:
         """Empty the ring and set the counter to zero; returns the new session."""
         self.session = self.session % LAST_CYCLE + 1
-        self._overwritten = 0
+        self._overwritten = self._acknowledged = 0
         self._image.start(self.session)
         return self.session

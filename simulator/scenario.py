@@ -73,7 +73,9 @@ class Part(ScenarioModel):
 class Strikes(ScenarioModel):
     """The schedule; velocities and directions are taken in turn, or drawn.
 
-    The first strike comes a period after the start of the module, or after the first request to it.
+    The first strike comes a period after the start of the module, or after the first request to it. With
+    `ahead` no strike comes while so many cycles have not been acknowledged as stored, as where a PLC asks for
+    that: a reader that is slow then loses none.
     """
 
     begin: Literal["at_once", "with_first_request"] = "at_once"
@@ -83,6 +85,7 @@ class Strikes(ScenarioModel):
     order: Literal["in_turn", "random"] = "in_turn"
     stroke_m: Positive = 0.0015
     cycles: Annotated[int, Field(ge=0)] | None = None
+    ahead: Annotated[int, Field(ge=1)] | None = None
 
     @property
     def first_s(self) -> float:

@@ -67,7 +67,16 @@ async def serve(
     -------
     bool
         Whether SIGINT, as of Ctrl-C, has ended it.
+
+    Raises
+    ------
+    SettingsError
+        The schedule waits for acknowledgements that the map has no register for.
     """
+    if scenario.strikes and scenario.strikes.ahead and "acknowledge_cycle" not in registers:
+        message = f"{scenario.name}: `strikes.ahead` waits until cycles are acknowledged, and the register "
+        message += "map has no `acknowledge_cycle`: leave `ahead` out, or give the map that register"
+        raise SettingsError(message)
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
     with stop_on_signals(stop) as received, _truths(truth_file, verbose=verbose) as tell:

@@ -50,6 +50,7 @@ async def test_a_cell_runs_on_a_module_that_has_less(kind: str, tmp_path: Path) 
     }  # fmt: skip
     if kind == "one-buffer":
         scenario["sensors"] = LOGGER
+        scenario["strikes"]["ahead"] = 1  # who reads late would find the next cycle in the only buffer
     async with simulator(tmp_path, **scenario) as told:
         cell = write_cell(tmp_path, told["port"], module={"register_map": register_map})
         async with forked("impactcell", "run", str(cell)) as service:

@@ -1,10 +1,16 @@
 """The module on a schedule: what it shows in its registers, read as the service reads them."""
 
+import asyncio
 import math
 
 import numpy as np
 import pytest
+import yaml
 
+from impactcell.errors import SettingsError
+from impactcell.fieldbus.registers import RegisterMap
+from simulator.serving import serve
+from tests.integration.processes import CONFIG
 from tests.module_client import MAP, Client, scenario
 
 
@@ -90,6 +96,38 @@ def test_acknowledged_cycles_are_not_counted_as_lost() -> None:
     client.put("acknowledge_session", 4)
     client.put("acknowledge_cycle", 1)
     assert client.get("acknowledged_cycle") == client.get("cycle_counter")
+
+
+def test_a_schedule_that_waits_until_cycles_are_stored() -> None:
+    client = Client(scenario(strikes={"period_s": 1.0, "ahead": 3}), session=5)
+
+    def acknowledge(cycle: int) -> None:
+        client.put("acknowledge_session", 5)
+        client.put("acknowledge_cycle", cycle)
+
+    def made_by(until_s: float) -> int:
+        for _ in range(4):  # it makes a few at a time
+            client.device.update(until_s)
+        return int(client.get("cycle_counter"))
+
+    assert made_by(2.9) == 2  # as any schedule, while it need not wait
+    assert made_by(50.0) == 3
+    assert client.device.due_s == math.inf
+    acknowledge(2)
+    assert made_by(50.9) == 4, "the one that was late, and none to make up for it"
+    assert made_by(99.0) == 5
+    client.device.set_counter(70)
+    assert made_by(199.0) == 73
+    acknowledge(72)
+    client.device.restart()
+    assert made_by(299.0) == 3
+    assert client.get("overwritten_count") == 0
+
+
+def test_a_schedule_cannot_wait_for_what_the_map_does_not_have() -> None:
+    summary = RegisterMap.from_mapping(yaml.safe_load((CONFIG / "maps" / "summary.yaml").read_text()))
+    with pytest.raises(SettingsError, match=r"`strikes\.ahead` waits .* no `acknowledge_cycle`"):
+        asyncio.run(serve(scenario(strikes={"ahead": 1}), summary))
 
 
 def test_same_seed_same_registers() -> None:
