@@ -11,7 +11,7 @@ import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 import psutil
@@ -61,14 +61,18 @@ class Endured:
     Attributes
     ----------
     shown : list of int
-        Numbers of the cycles that the subscriber was told of, as they came.
-    missed : int
-        Cycles that the module had overwritten before they were read.
+        Numbers of the cycles that the subscriber was told of, as they came, their status Good.
+    restated : int
+        How often it was told that the last number is no longer Good: silence, or no communication.
+    missed, missed_at_first : int
+        Cycles that the module had overwritten before they were read, and how many when the first was shown.
     """
 
     moments: list[Moment]
     shown: list[int]
+    restated: int
     missed: int
+    missed_at_first: int
     file_mb: float
     seconds: float
 
@@ -78,10 +82,13 @@ class Subscriber:
 
     def __init__(self) -> None:
         self.shown: list[int] = []
+        self.restated = 0
 
-    def datachange_notification(self, _: object, value: object, __: object) -> None:
-        """Take one value (called by asyncua)."""
-        if isinstance(value, int) and value:
+    def datachange_notification(self, _: object, value: object, data: Any) -> None:
+        """Take one value (called by asyncua); a status other than Good repeats the last one."""
+        if not data.monitored_item.Value.StatusCode.is_good():
+            self.restated += value != 0
+        elif isinstance(value, int) and value:
             self.shown.append(value)
 
 
@@ -145,11 +152,19 @@ async def endure(directory: Path, cycles: int, rate_hz: float) -> Endured:
                 await subscription.subscribe_data_change([node], queuesize=1000)
                 began_s = time.monotonic()
                 assert isinstance(service.process, asyncio.subprocess.Process)
+                while not subscriber.shown:
+                    await asyncio.sleep(0.05)
+                at_first = await _missed(monitor)
                 moments = await watch(psutil.Process(service.process.pid), subscriber, cycles)
                 seconds = time.monotonic() - began_s
                 print("\n".join(service.lines), file=sys.stderr)
-                missed = int((await asyncio.to_thread(totals, monitor))["impactcell_cycles_missed_total"])
-    return Endured(moments, subscriber.shown, missed, journal_mb(directory), seconds)
+                missed = await _missed(monitor)
+    shown, restated = subscriber.shown, subscriber.restated
+    return Endured(moments, shown, restated, missed, at_first, journal_mb(directory), seconds)
+
+
+async def _missed(monitor: int) -> int:
+    return int((await asyncio.to_thread(totals, monitor))["impactcell_cycles_missed_total"])
 
 
 def journal_mb(directory: Path) -> float:
@@ -185,7 +200,8 @@ def table(run: Endured, cycles: int, rate_hz: float) -> Table:
             "cycles notified since the first",
             f"{cycles - run.shown[0] + 1}",
             f"{len(numbers)}",
-            f"{repeated} twice or out of order, {skipped} left out",
+            (f"{repeated} twice or out of order, {skipped} left out, {run.missed - run.missed_at_first} "
+             f"overwritten meanwhile; {run.restated} times told to be old"),
         ),
         ("cycles overwritten in the module's ring", "0", f"{run.missed}", "the first while starting"),
         ("journal, with what is beside it", "", f"{run.file_mb:.1f} MB", f"may have {FILE_MB:g} MB"),
