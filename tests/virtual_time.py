@@ -49,7 +49,7 @@ class _HastySelector(selectors.DefaultSelector):
     silence, so that no reply that is on its way between two sockets of this process is ever given up."""
     TIMEOUT_S, SILENCE_S = 1.0, 0.25
     """A timer that is at least so long is the limit of an answer, and takes at least so much real silence:
-    the bytes of a pseudo terminal are carried by a thread of the kernel, which waits for its turn as all do."""
+    the bytes of a pseudo terminal are carried by a thread of the kernel, which waits for its turn too."""
     skipped_s = 0.0
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
