@@ -79,7 +79,8 @@ def needed_force(model: FittedModel, record: UniformRecord, stretch: slice, scal
     smooth, friction = _law(model, covariates)(record.position, velocity, np.abs(carried))
     gain = 1.0 + model.nuisance("force_gain")
     gravity = gain * model.base.gravity_torque.value * np.sin(record.position)
-    deviation = _gravity_deviation(model, record.position)
+    beyond, by_zero = _gravity_deviation(model)
+    deviation = by_zero * np.cos(record.position) - beyond * np.sin(record.position)
     beside = gravity - smooth - model.nuisance("force_offset") + direction * friction - deviation
     force = averaged(beside, half, record.step_s)
     force += record.inertia * (gain + model.nuisance("inertia")) * acceleration
@@ -171,8 +172,8 @@ def _runner(
     law = _law(
         model, {name: np.array([record.covariates.get(name, 0.0) for record in records]) for name in columns}
     )
-    sine_torque = model.base.gravity_torque.value + model.nuisance("gravity_torque")
-    cosine_torque = model.gravity * model.nuisance("position_offset")
+    beyond, by_zero = _gravity_deviation(model)
+    sine_torque = model.base.gravity_torque.value + beyond
     eccentricity = _eccentricity(model)
 
     def reading(angle: Samples) -> Samples:
@@ -184,7 +185,7 @@ def _runner(
         middle = q + 0.5 * step * v
         sine = np.sin(middle)
         load = np.abs(force + model.gravity * sine)
-        outside = force - sine_torque * sine + cosine_torque * np.cos(middle)
+        outside = force - sine_torque * sine + by_zero * np.cos(middle)
         ahead = v
         for _ in range(2):
             smooth, friction = law(middle, 0.5 * (v + ahead), load)
@@ -270,10 +271,9 @@ def resistance(finding: MachineFinding, model: FittedModel) -> tuple[float, floa
     return least, largest
 
 
-def _gravity_deviation(model: FittedModel, position: Samples) -> Samples:
-    """Torque of gravity beyond its stated value, and by the zero of the position sensor."""
-    deviation: Samples = model.gravity * model.nuisance("position_offset") * np.cos(position)
-    return deviation - model.nuisance("gravity_torque") * np.sin(position)
+def _gravity_deviation(model: FittedModel) -> tuple[float, float]:
+    """G beyond its stated value, of -sin q, and what the zero of the position sensor adds, of cos q."""
+    return model.nuisance("gravity_torque"), model.gravity * model.nuisance("position_offset")
 
 
 def _eccentricity(model: FittedModel) -> Samples:
