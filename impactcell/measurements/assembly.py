@@ -73,9 +73,7 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
         captures = [_whole(number, record, given) for number, record in enumerate(records, 1)]
         notes += _of_taps_only(given)
     if all(math.isnan(capture.mass_kg) for capture in captures):
-        notes.append(
-            "no mass is stated: it is fitted, and only friction over mass is seen; give --set mass=18.9kg"
-        )
+        notes.append(_without_mass(coordinate))
     if excitation is Excitation.TAP and "stroke" not in given.constants:
         notes.append(
             "no stroke is stated: the actuator is taken to halt as it loses contact; give --set stroke=1.5mm"
@@ -108,6 +106,15 @@ def write_campaign(tables: Sequence[Table], mapping: Mapping, directory: Path) -
     imported = make_campaign(tables, mapping)
     write_directory(imported.campaign, directory)
     return imported
+
+
+def _without_mass(coordinate: Coordinate) -> str:
+    if coordinate is Coordinate.ROTATION:
+        return (
+            "no inertia is stated: the base model has to say it (inertia_kg_m2); "
+            'give --set "mass=0.02 kg m²" where it is not one for all'
+        )
+    return "no mass is stated: it is fitted, and only friction over mass is seen; give --set mass=18.9kg"
 
 
 def _of_taps_only(given: Given) -> list[str]:

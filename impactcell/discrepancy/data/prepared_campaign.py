@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.campaign import Campaign, Excitation, from_contact
+from impactcell.campaign import Campaign, Coordinate, Excitation, from_contact
 from impactcell.discrepancy.data.driven import Driven
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.free_slide import FreeSlide
@@ -102,7 +102,7 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         shots.append(_with_open_onset(shot) if begun_before else shot)
     notes += strategy.missing_information(shots)
     notes += _time_gaps(shots)
-    check_units(strategy.unit_ratios(shot, campaign.gravity_m_s2) for shot in shots)
+    _check_units(campaign, shots)
     return PreparedCampaign(
         strategy,
         campaign.gravity_m_s2,
@@ -130,7 +130,19 @@ def check_campaign_units(campaign: Campaign) -> None:
     strategy = STRATEGIES[campaign.excitation]
     captures = strategy.cut(campaign, [])
     shots = [_prepared_shot(strategy, capture, (1, 1), 0, 0) for capture, _ in captures]
-    check_units(strategy.unit_ratios(shot, campaign.gravity_m_s2) for shot in shots)
+    _check_units(campaign, shots)
+
+
+def _check_units(campaign: Campaign, shots: Sequence[PreparedShot]) -> None:
+    strategy = STRATEGIES[campaign.excitation]
+    try:
+        check_units(strategy.unit_ratios(shot, campaign.gravity_m_s2) for shot in shots)
+    except CampaignError as error:
+        if campaign.coordinate is not Coordinate.ROTATION:
+            raise
+        raise CampaignError(
+            "what turns is no part that slides under its weight: give a base model (--base BASE.yaml)"
+        ) from error
 
 
 def split_held_out(prepared: PreparedCampaign, seed: int) -> tuple[IndexArray, IndexArray]:

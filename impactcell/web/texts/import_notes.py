@@ -26,6 +26,8 @@ GERMAN: Final = {
         "kein Hub angegeben: der Antrieb gilt als angehalten, wenn der Kontakt endet",
     r"no mass is stated: it is fitted, and only friction over mass is seen":
         "keine Masse angegeben: sie wird angepasst, zu sehen ist nur Reibung durch Masse",
+    r"no inertia is stated: the base model has to say it \(inertia_kg_m2\)":
+        "keine Trägheit angegeben: das Grundmodell muss sie nennen (inertia_kg_m2)",
     r"(.+) is (\S+), where about 1 is possible: check the unit of (.+) or (\S+) "
     r"\(off by a factor of about (\S+)\); it will be refused as it stands":
         r"Einheit prüfen: \3 oder \4 (um etwa den Faktor \5 daneben); so wird es später abgelehnt",

@@ -329,6 +329,20 @@ def test_one_column_of_a_mapping_file_needs_no_list(tmp_path: Path) -> None:
     assert read_given({}, said).others == {"Druck": ColumnMeaning.COVARIATE, "7": ColumnMeaning.IGNORED}
 
 
+def test_what_rotates_is_asked_for_its_inertia_and_what_slides_for_its_mass() -> None:
+    sliding = table(t=("s", TIME), Kraft=("N", 100.0 * WAVE), Weg=("mm", -90.0 * WAVE))
+    rotating = table(t=("s", TIME), Drehmoment=("Ncm", 100.0 * WAVE), Winkel=("deg", -90.0 * WAVE))
+    for records, asked, example in (
+        (sliding, "mass", "mass=18.9kg"),
+        (rotating, "inertia", "mass=0.02 kg m²"),
+    ):
+        (note,) = [n for n in make_campaign([records], guess([records])).notes if "is stated" in n]
+        assert note.startswith(f"no {asked} is stated")
+        assert example in note
+        assert page_note(note, "de")[0] == "de"
+        read_given({"constants": [example]})
+
+
 def test_what_rotates_is_a_campaign_of_torque_angle_and_inertia(tmp_path: Path) -> None:
     rotating = table(t=("s", TIME), Drehmoment=("Ncm", 100.0 * WAVE), Winkel=("deg", -90.0 * WAVE))
     given = read_given({"constants": ["mass=49 kgcm2"]})
