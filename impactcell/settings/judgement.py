@@ -18,6 +18,7 @@ from impactcell.prediction.mass_interpolation import velocity_range_m_s
 from impactcell.process import yaml_loader
 from impactcell.process.yaml_loader import FilePosition
 from impactcell.settings.cells import CellConfig
+from impactcell.settings.plausible_tap import doubted_values, immovable
 
 STROKE_TOLERANCE: Final = 0.01
 """A cell's stroke may differ from its model's by this share: less than a stroke is known to."""
@@ -69,7 +70,7 @@ def judge_cell(cell: CellConfig) -> list[CellFinding]:
         Its file is not what it was.
     """
     _, positions = yaml_loader.load(cell.path)
-    remarks = [*_of_model(cell), *_of_sensors(cell), *_of_map(cell), *_of_service(cell)]
+    remarks = [*_of_model(cell), *_of_units(cell), *_of_sensors(cell), *_of_map(cell), *_of_service(cell)]
     findings = [
         CellFinding(
             cell.path,
@@ -81,6 +82,13 @@ def judge_cell(cell: CellConfig) -> list[CellFinding]:
         for remark in remarks
     ]
     return sorted(findings, key=lambda finding: not finding.is_fault)
+
+
+def _of_units(cell: CellConfig) -> Iterator[_Remark]:
+    if still := immovable(cell):
+        yield _Remark(("part", "mass_kg"), still)
+    for place, doubt in doubted_values(cell):
+        yield _Remark(place, doubt, is_fault=False)
 
 
 def _of_model(cell: CellConfig) -> Iterator[_Remark]:
