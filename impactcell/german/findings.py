@@ -1,9 +1,11 @@
 """What the discrepancy workflow found, said in German from its `result.json`, whose headline is English."""
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
+from impactcell.german.open_loop import german_open_loop_sentence
 from impactcell.physics.effect import German
 from impactcell.physics.effects import LIBRARY
 from impactcell.process.progress import COMPILING
@@ -131,6 +133,7 @@ def german_headline(result: Mapping[str, Any]) -> str:
     law = result.get("law")
     if law:
         said += f" Ein Gesetz, das keine Bibliothek hat, passt dazu: {german_equation(law['equation'])}."
+    said += _follows(result.get("simulation"))
     return f"{said} (Abweichungen an zurückgehaltenen Messungen; 1 ist das Rauschen der Sensoren.)"
 
 
@@ -147,6 +150,17 @@ def _fall(result: Mapping[str, Any], before: str, after: str) -> str:
                 f"der von Wiederholungen, die Abweichung der Verläufe bleibt bei {stays}"
             )
     return f"die Abweichung von {before} auf {after}"
+
+
+def _follows(simulation: Mapping[str, Any] | None) -> str:
+    """Say where the model, simulated by itself, follows little of what was held out."""
+    if not simulation:
+        return ""
+    channel, fit = simulation["channel"], simulation["fit_percent"]["after"]
+    said = german_open_loop_sentence(
+        GERMAN_QUANTITIES.get(channel, channel), math.nan if fit is None else fit
+    )
+    return f" {said}" if said else ""
 
 
 def _outdone(result: Mapping[str, Any]) -> str:

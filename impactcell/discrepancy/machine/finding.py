@@ -170,6 +170,8 @@ class MachineFinding:
         Why nothing is, where something was looked for.
     experiments : tuple of Proposal
         Records that would tell tied terms apart.
+    simulated : tuple of OpenLoopError
+        Of the held-out simulation, by the nominal and by the final model; empty until it was done.
     """
 
     base: BaseModel
@@ -194,6 +196,7 @@ class MachineFinding:
     law: MachineLaw | None = None
     law_refused: str = ""
     experiments: tuple[Proposal, ...] = ()
+    simulated: tuple[OpenLoopError, ...] = ()
 
     @staticmethod
     def enough(training: Blocks, held_out: Blocks) -> bool:

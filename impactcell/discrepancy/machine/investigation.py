@@ -13,6 +13,7 @@ from impactcell.discrepancy.machine.experiment_design import with_experiments
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.law_search import with_law
 from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
 from impactcell.errors import CampaignError
@@ -59,8 +60,11 @@ def investigate_machine(
     base, notes = hold_what_cannot_be_seen(base, records)
     candidates = _candidates(base, records)
     fits = MachineFits(records, base, candidates, _held_records(records, train, test))
+    _check_blocks(fits)
     finding = fits.investigate([*notes_of(data_faults), *notes], seed)
-    return with_experiments(fits, with_law(fits, finding))
+    finding = with_experiments(fits, with_law(fits, finding))
+    models = finding.nominal, finding.final
+    return replace(finding, simulated=tuple(simulate_held_out(finding, model) for model in models))
 
 
 def _check_columns(base: BaseModel, records: Sequence[UniformRecord]) -> None:
@@ -78,6 +82,25 @@ def _check_columns(base: BaseModel, records: Sequence[UniformRecord]) -> None:
                 f"{choice.identifier} goes by the column {choice.covariate!r} of shots.csv, which shots "
                 f"{', '.join(lacking)} do not state"
             )
+
+
+def _check_blocks(fits: MachineFits) -> None:
+    """See that there is something to fit and something held out.
+
+    Raises
+    ------
+    CampaignError
+        There is not.
+    """
+    training, held_out, _ = fits.blocks()
+    if not (len(training) and len(held_out)):
+        thirds = fits.held is None
+        raise CampaignError(
+            f"the records are too short for blocks of {fits.block_s:.3g} s"
+            f"{', of which the last third of each is held out' if thirds else ''}: "
+            f"{'hold whole records out (--test), ' if thirds else ''}make them longer, or say a shorter "
+            "`block_s` in the base model"
+        )
 
 
 def hold_what_cannot_be_seen(

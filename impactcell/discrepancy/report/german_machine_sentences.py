@@ -5,9 +5,11 @@ from typing import Final
 from impactcell.discrepancy.machine import MachineFinding
 from impactcell.discrepancy.report.german_notes import Patterns, note, reason
 from impactcell.discrepancy.report.german_sentences import equation, in_german, label, written
+from impactcell.discrepancy.report.german_words import phrase as channel_name
 from impactcell.discrepancy.report.german_words import term_name as phrase
 from impactcell.discrepancy.report.machine_sentences import law_equation
 from impactcell.german.findings import enumerated
+from impactcell.german.open_loop import german_open_loop_sentence
 
 __all__ = ["equation", "headline", "label", "note", "phrase", "reason", "setting", "written"]
 _SETTINGS: Final[Patterns] = (
@@ -65,7 +67,9 @@ def headline(finding: MachineFinding) -> str:
             f" {equation(law_equation(finding.law))}, bringt die Abweichung auf "
             f"{finding.law.fall.after:.2f}: ein Gesetz, das keine Liste hatte."
         )
-    return written(said)
+    fit = finding.simulated[-1].fit_percent
+    follows = german_open_loop_sentence(channel_name(finding.base.response), fit)
+    return f"{written(said)} {follows}".rstrip()
 
 
 def setting(english: str) -> str:

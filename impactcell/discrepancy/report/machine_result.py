@@ -14,7 +14,6 @@ from impactcell.discrepancy.machine import (
     FittedModel,
     MachineFinding,
     OpenLoopError,
-    simulate_held_out,
     term_of,
 )
 from impactcell.discrepancy.report.machine_sentences import headline, law_equation
@@ -48,7 +47,7 @@ def parameter_name(name: str, unit: str, coordinate: Coordinate) -> str:
 
 def machine_document(finding: MachineFinding) -> dict[str, Any]:
     """Outcome as `result.json` has it."""
-    errors = simulate_held_out(finding, finding.nominal), simulate_held_out(finding, finding.final)
+    before, after = finding.simulated
     fall = finding.fall
     level = math.sqrt(max(fall.after**2 - 1.0, 0.0))
     nominal = tuple(term for term in finding.final.terms if term.choice.name not in finding.established)
@@ -85,7 +84,7 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
                 "expected_without_gap": [round_digits(bound) for bound in finding.expected],
             },
         },
-        "simulation": _simulation(finding, errors),
+        "simulation": _simulation(finding, (before, after)),
         **_law(finding),
         "next_experiment": experiments(finding.experiments),
         "nominal": _nuisances(finding.final)
@@ -105,7 +104,7 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
             "training": len(finding.training),
             "held_out": len(finding.held_out),
         },
-        "notes": [*finding.notes, *notes_of_simulation(finding, errors)],
+        "notes": [*finding.notes, *notes_of_simulation(finding, (before, after))],
         "seed": finding.seed,
         "model": "model.extended.yaml",
         "report": "report.html",

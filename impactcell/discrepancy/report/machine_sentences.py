@@ -3,6 +3,7 @@
 from impactcell.discrepancy.machine import FREE_FORMS, LAW_PLACES, MachineFinding, MachineLaw, term_of
 from impactcell.discrepancy.report.sentences import equation, label, note, reason, setting, written
 from impactcell.german.findings import enumerated
+from impactcell.german.open_loop import open_loop_sentence
 
 __all__ = ["equation", "headline", "label", "note", "phrase", "reason", "setting", "written"]
 
@@ -15,13 +16,14 @@ def phrase(name: str) -> str:
 
 def headline(finding: MachineFinding) -> str:
     """Say what is established, what remains, and which law would explain it, if one was found."""
-    law = finding.law
-    if law is None:
-        return _conclusion(finding)
-    return (
-        f"{_conclusion(finding)} {law_equation(law)}, takes the held-out gap to {law.fall.after:.2f}: "
-        "a law that nobody had listed."
-    )
+    law, said = finding.law, _conclusion(finding)
+    if law is not None:
+        said += (
+            f" {law_equation(law)}, takes the held-out gap to {law.fall.after:.2f}: "
+            "a law that nobody had listed."
+        )
+    fit = finding.simulated[-1].fit_percent
+    return f"{said} {open_loop_sentence(finding.base.response, fit, 'records')}".rstrip()
 
 
 def law_equation(law: MachineLaw) -> str:

@@ -7,6 +7,7 @@ from impactcell.discrepancy.data import CHANNELS
 from impactcell.discrepancy.search import NO_GAP, UNTESTED, Remaining, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.german.findings import enumerated
+from impactcell.german.open_loop import open_loop_sentence
 from impactcell.physics.effects import find_effect
 from impactcell.physics.free_column_forms import printed
 
@@ -40,10 +41,17 @@ def reason(english: str) -> tuple[str, str]:
 
 
 def headline(result: DiscrepancyResult) -> str:
-    """Say what is established, what remains, and which law would explain it, if one was found."""
+    """Say what is established, what remains, which law explains it, and whether it can predict."""
+    simulation, unit = result.simulation, result.prepared.excitation.unit
+    follows = open_loop_sentence(simulation.channel, simulation.after.fit_percent, unit)
+    return f"{_conclusion(result)}{_proposed(result)} {follows}".rstrip()
+
+
+def _proposed(result: DiscrepancyResult) -> str:
+    """Say which law would explain what is left; empty where none was found."""
     finding = result.law
     if finding is None or finding.refused:
-        return _conclusion(result)
+        return ""
     change = finding.change
     before, after = change.before.of(change.parts), change.after.of(change.parts)
     falling = "friction factors' spread falls" if finding.term.form.is_between_shots else "traces fall"
@@ -54,7 +62,7 @@ def headline(result: DiscrepancyResult) -> str:
     what = f"a free-form function of {letters}, the {u}"
     if finding.proposed is not None:
         what = f"{finding.proposed.functional_form} of {letters}, the {u}, a law that no library has"
-    return f"{_conclusion(result)} With s in {form.effect.equation} as {what}, the {fall}."
+    return f" With s in {form.effect.equation} as {what}, the {fall}."
 
 
 def noise_floor_sentence(result: DiscrepancyResult) -> str:

@@ -1,0 +1,88 @@
+"""A model that cannot predict is said to be one, in words: head line and report, English and German."""
+
+import json
+import math
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from impactcell.api.machine_findings import write_machine_findings
+from impactcell.campaign import Campaign, Coordinate, Excitation
+from impactcell.discrepancy.data import prepare
+from impactcell.discrepancy.machine import BaseModel, NumberPrior, investigate_machine
+from impactcell.discrepancy.report import sentences
+from impactcell.errors import CampaignError
+from impactcell.german.findings import german_headline
+from impactcell.german.open_loop import german_open_loop_sentence, open_loop_sentence
+from impactcell.records import Capture, Channel
+
+PENDULUM = BaseModel(
+    coordinate=Coordinate.ROTATION,
+    inertia=NumberPrior(0.02),
+    gravity_torque=NumberPrior(0.55, math.inf),
+)
+
+
+def swings(rates: list[float], lasting_s: float) -> Campaign:
+    """Free swings of viscously damped pendulums in closed form, one a rate of its swing [rad/s]."""
+    rng = np.random.default_rng(4)
+    time = np.arange(0.0, lasting_s, 0.01)
+    shots = []
+    for number, rate in enumerate(rates, 1):
+        angle = 0.1 * np.exp(-0.1 * time) * np.cos(rate * time) + rng.normal(0.0, 1e-4, time.size)
+        shots.append(Capture(number, math.nan, math.nan, None, Channel(time, angle, 1e-4)))
+    return Campaign(Excitation.FREE_SLIDE, tuple(shots), coordinate=Coordinate.ROTATION)
+
+
+def test_logs_that_are_not_of_one_machine_are_asked_after(tmp_path: Path) -> None:
+    campaign = swings([3.0, 9.0, 3.2, 8.0], 8.0)
+    finding = investigate_machine(campaign, PENDULUM)
+    errors = finding.simulated
+    assert errors[-1].fit_percent < 0.0
+    times = f"{1.0 - errors[-1].fit_percent / 100.0:.3g}"
+    write_machine_findings(finding, campaign, tmp_path / "found", "four logs")
+    result = json.loads((tmp_path / "found" / "result.json").read_text(encoding="utf-8"))
+    assert result["headline"].endswith(
+        f"does not follow the held-out position: it errs {times} times as much as a constant. "
+        "See whether all records are of one machine in one state."
+    )
+    pages = [
+        (tmp_path / "found" / name).read_text(encoding="utf-8") for name in ("report.html", "report.de.html")
+    ]
+    assert "does not follow the held-out position" in pages[0]
+    assert f"nicht (Position): es irrt {times.replace('.', ',')}-mal so viel wie eine Konstante." in pages[1]
+    assert "ob alle Messungen von einer Maschine" in pages[1]
+    assert "ob alle Messungen von einer Maschine" in german_headline(result)
+
+
+@pytest.mark.parametrize(("fit", "says"), [(-476.0, "5.76"), (20.0, "0.8"), (60.0, ""), (math.nan, "")])
+def test_what_is_said_goes_by_how_far_it_is_from_a_constant(fit: float, says: str) -> None:
+    english, german = open_loop_sentence("position", fit, "shots"), german_open_loop_sentence("Position", fit)
+    assert bool(english) is bool(german) is bool(says)
+    assert says in english
+    assert says.replace(".", ",") in german
+    assert ("See whether all shots" in english) is ("Zu prüfen ist" in german) is (fit < 0.0)
+
+
+def test_taps_are_told_the_same_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sentences, "_conclusion", lambda _: "Missing: it.")
+    for fit, said in ((90.0, "Missing: it."), (30.0, "it errs 0.7 times as much as a constant.")):
+        simulation = SimpleNamespace(channel="position", after=SimpleNamespace(fit_percent=fit))
+        prepared = SimpleNamespace(excitation=SimpleNamespace(unit="shots"))
+        found: Any = SimpleNamespace(simulation=simulation, prepared=prepared, law=None)
+        assert sentences.headline(found).endswith(said)
+
+
+@pytest.mark.parametrize(("rates", "lasting_s"), [([3.0, 3.0], 4.0), ([5.2], 3.0)])
+def test_records_too_short_to_hold_anything_out_are_refused(rates: list[float], lasting_s: float) -> None:
+    with pytest.raises(CampaignError, match=r"too short .*--test.* `block_s`"):
+        investigate_machine(swings(rates, lasting_s), PENDULUM)
+
+
+def test_what_turns_is_asked_for_a_base_model() -> None:
+    """Radians a second are no share of gravity: no unit is wrong where a base model is missing."""
+    with pytest.raises(CampaignError, match=r"give a base model \(--base"):
+        prepare(swings([3.0] * 6, 8.0))
