@@ -36,10 +36,13 @@ class Baseline:
 
 
 def noise_of(values: Samples) -> float:
-    """Give the standard deviation of the white noise of a channel, from its second differences.
+    """Give the standard deviation of the white noise that a channel shows, from second differences; or 0.
 
     The median of their magnitude is that of the noise where less than half of the samples lie on a kink; the
-    second difference of white noise has a variance of 6.
+    second difference of white noise has a variance of 6. It is 0 where most neighbours go on as before: of a
+    channel without noise, and of one whose raster hides it. `white_noise_std` of the features is what a fit
+    weighs by, and never below what a raster makes; here a threshold stands beside shares of the range and
+    steps of the raster, and that there is no noise decides by itself (an exact record rests on a plateau).
     """
     if len(values) < 5:
         return 0.0

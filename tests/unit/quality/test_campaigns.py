@@ -1,6 +1,7 @@
 """Faults of data are found where they were put, told with shot and time, and not found where there are
 none."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -8,7 +9,9 @@ import numpy as np
 import pytest
 
 from impactcell.campaign import Campaign, Excitation
+from impactcell.campaign.contacts import noise_of
 from impactcell.errors import CampaignError
+from impactcell.features import white_noise_std
 from impactcell.quality import Fault, inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Channel
 from tests.taps import Tap
@@ -178,3 +181,19 @@ def test_a_coarse_raster_is_no_fault(shots: tuple[Capture, ...], raster_n: float
         )
 
     assert inspect_campaign(changed(shots, rounded, None)) == ()
+
+
+def test_the_noise_that_is_shown_and_that_which_a_fit_weighs_by_agree_but_for_exact_and_coarse_channels() -> (
+    None
+):
+    """A smooth motion beneath, of which both see nothing; a raster r leaves r / sqrt(12)."""
+    rng, time = np.random.default_rng(2), np.linspace(0.0, 1.0, 4000)
+    motion = np.sin(5.0 * time)
+    noisy = motion + rng.normal(0.0, 1e-3, time.size)
+    assert noise_of(noisy) == pytest.approx(1e-3, rel=0.05)
+    assert white_noise_std(noisy) == pytest.approx(1e-3, rel=0.05)
+    coarse = np.round(noisy / 0.02) * 0.02
+    exact = np.where(time < 0.3, motion, motion[1200])
+    for values, least in ((coarse, 0.02 / math.sqrt(12.0)), (exact, 0.0)):
+        assert noise_of(values) == 0.0
+        assert white_noise_std(values) > 0.99 * least
