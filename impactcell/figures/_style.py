@@ -5,10 +5,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 COLOURS: Final = ("#0072b2", "#009e73", "#d55e00")
 """Blue, green and vermilion of Okabe and Ito's palette, which all eyes tell apart (2008)."""
+DASHES: Final = ("-", (0, (6, 1.5)), (0, (3, 1, 1, 1)))
+MARKERS: Final = ("o", "s", "^")
+"""What tells the curves of the three colours apart where there is none."""
 GREY: Final = "#555555"
 """Of what is said beside the curves."""
 PALE: Final = "#bbbbbb"
@@ -32,6 +36,11 @@ STYLE: Any = {
 
 Drawing = tuple[str, tuple[float, float], Callable[["Figure"], None]]
 """Name of the file, width and height in inches, and what draws it."""
+
+
+def legend_below(axes: "Axes") -> None:
+    """Put a panel's legend below it, where it hides nothing that was measured."""
+    axes.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
 
 
 def write_figures(directory: Path, drawings: Iterable[Drawing]) -> list[Path]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from impactcell.features import extract
-from impactcell.figures._style import COLOURS, GREY, PALE, write_figures
+from impactcell.figures._style import COLOURS, GREY, PALE, legend_below, write_figures
 from impactcell.records import Capture, Channel, Samples
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.tracking import wear_batch
@@ -152,7 +152,9 @@ def along_stroke(figure: "Figure") -> None:
     axes[0].set(xlabel="distance slid / mm", ylabel="kinetic friction coefficient", title="along the stroke")
     normal = {cycle: d.signature for cycle, d in judged.items() if d.deviation is None}
     axes[1].plot(list(normal), [s.spe for s in normal.values()], ".", color=BLUE, label="SPE")
-    axes[1].plot(list(normal), [s.t_squared for s in normal.values()], ".", color=GREEN, label="T²")
+    axes[1].plot(
+        list(normal), [s.t_squared for s in normal.values()], "^", color=GREEN, markersize=3, label="T²"
+    )
     axes[1].set(xlabel="cycle", ylabel="statistic", yscale="log", title="judging each cycle")
     _legends(axes)
 
@@ -160,7 +162,7 @@ def along_stroke(figure: "Figure") -> None:
 def _legends(panels: "Sequence[Axes]") -> None:
     """Put each panel's legend below it, where it hides nothing that was measured."""
     for axes in panels:
-        axes.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2)
+        legend_below(axes)
 
 
 def _tracked(

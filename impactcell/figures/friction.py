@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from impactcell.figures._style import COLOURS, GREY, write_figures
+from impactcell.figures._style import COLOURS, DASHES, GREY, MARKERS, write_figures
 from impactcell.physics import Plant, TapEventKind, TapInput, simulate_tap
 from impactcell.prediction import Model, Prior, calibrate, estimate, printed_predictor
 from impactcell.prediction.equations import force_weight
@@ -62,23 +62,24 @@ def response(figure: "Figure") -> None:
     """Draw contact force, velocity and position of one tap at three frictions."""
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
     times = np.linspace(-3e-3, 0.115, 2400)
-    for mu, colour in zip(FRICTIONS, COLOURS, strict=True):
+    for mu, colour, dash in zip(FRICTIONS, COLOURS, DASHES, strict=True):
         motion = simulate_tap(plant(mu), tap(4000))
         traces = motion.sample(times)
-        top.plot(1e3 * times, traces.force_n, color=colour, label=rf"$\mu_s$ = {mu:.2f}")
-        middle.plot(1e3 * times, 1e3 * traces.velocity_m_s, color=colour)
-        bottom.plot(1e3 * times, 1e3 * traces.position_m, color=colour)
+        line = {"color": colour, "linestyle": dash}
+        top.plot(1e3 * times, traces.force_n, label=rf"$\mu_s$ = {mu:.2f}", **line)
+        middle.plot(1e3 * times, 1e3 * traces.velocity_m_s, **line)
+        bottom.plot(1e3 * times, 1e3 * traces.position_m, **line)
         bottom.plot([1e3 * motion.stop_s], [1e3 * motion.displacement_m], "o", color=colour, markersize=4)
         peak = np.argmax(traces.force_n)
         top.plot([1e3 * times[peak]], [motion.peak_force_n], "o", color=colour, markersize=4)
     last = simulate_tap(plant(FRICTIONS[0]), tap(4000))
     traces = last.sample(times)
     driven = times <= last.separation_s
-    bottom.plot(1e3 * times[driven], 1e3 * traces.actuator_m[driven], color=GREY, linestyle="--")
+    bottom.plot(1e3 * times[driven], 1e3 * traces.actuator_m[driven], color=GREY, linestyle=":")
     bottom.annotate("actuator", (12.0, 0.8), (24.0, 0.4), color=GREY, va="center",
                     arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.6})  # fmt: skip
     driven_at = 1e3 * tap(4000).velocity_m_s
-    middle.plot([0.0, 1e3 * last.separation_s], [driven_at, driven_at], color=GREY, linestyle="--")
+    middle.plot([0.0, 1e3 * last.separation_s], [driven_at, driven_at], color=GREY, linestyle=":")
     middle.annotate("actuator", (14.0, driven_at), (24.0, 30.0), color=GREY, va="center",
                     arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.6})  # fmt: skip
     separation_s = [event.time_s for event in last.events if event.kind is TapEventKind.SEPARATION][-1]
@@ -101,23 +102,17 @@ def force_and_distance(figure: "Figure") -> None:
     velocities = np.linspace(2000, 6000, 17)
     curve = np.linspace(2000, 6000, 200)
     paper = MassInterpolation(MASS_KG, ((1.0, printed_predictor()),), inside=True)
-    for mu, colour in zip(FRICTIONS, COLOURS, strict=True):
+    for mu, colour, marker in zip(FRICTIONS, COLOURS, MARKERS, strict=True):
         motions = [simulate_tap(plant(mu), tap(float(v))) for v in velocities]
-        left.plot(velocities, [motion.peak_force_n for motion in motions], "o", color=colour, markersize=3.2)
-        right.plot(
-            velocities,
-            [1e3 * motion.sliding_distance_m for motion in motions],
-            "o",
-            color=colour,
-            markersize=3.2,
-        )
-        left.plot(
-            curve, [paper.peak_force(mu, v / 6e4) for v in curve], color=colour, label=rf"$\mu_s$ = {mu:.2f}"
-        )
+        forces_n = [motion.peak_force_n for motion in motions]
+        points = {"color": colour, "marker": marker, "linestyle": "", "markersize": 3.2}
+        left.plot(velocities, forces_n, **points)
+        right.plot(velocities, [1e3 * motion.sliding_distance_m for motion in motions], **points)
+        left.plot(curve, [paper.peak_force(mu, v / 6e4) for v in curve], color=colour)
         right.plot(curve, [1e3 * paper.sliding_distance(mu, v / 6e4) for v in curve], color=colour)
-    left.plot([], [], "o", color=GREY, markersize=3.2, label="model (1)-(3)")
-    left.plot([], [], color=GREY, label="(4), (5) as printed")
-    right.legend(handles=left.get_legend_handles_labels()[0], loc="upper left")
+        right.plot([], [], label=rf"$\mu_s$ = {mu:.2f}, model (1)-(3)", **points)
+    right.plot([], [], color=GREY, label="(4), (5) as printed")
+    right.legend(loc="upper left")
     left.set_ylabel("peak force / N")
     right.set_ylabel("sliding distance / mm")
     for axis in (left, right):
@@ -157,7 +152,7 @@ def errors(figure: "Figure") -> None:
     frictions = np.linspace(0.15, 0.25, 101)
     weights = np.array([force_weight(mixed, mu, 0.075) for mu in frictions])  # the same at every velocity
     right.plot(frictions, weights, color=COLOURS[0], label="peak force")
-    right.plot(frictions, 1.0 - weights, color=COLOURS[2], label="sliding distance")
+    right.plot(frictions, 1.0 - weights, color=COLOURS[2], linestyle=DASHES[1], label="sliding distance")
     right.set_ylim(0, 1)
     right.set_ylabel("weight in (6)")
     right.set_xlabel(r"$\mu_s$")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from impactcell.figures._style import COLOURS, GREY, write_figures
+from impactcell.figures._style import COLOURS, GREY, legend_below, write_figures
 from impactcell.physics import Plant, TapInput, simulate_tap
 from impactcell.positioning import Tap, TapPlanner
 
@@ -43,7 +43,7 @@ SEED = 7
 
 def draw(directory: Path) -> list[Path]:
     """Write the figure as PNG and SVG."""
-    return write_figures(directory, [("positioning", (7.2, 2.9), remaining_distance)])
+    return write_figures(directory, [("positioning", (7.2, 3.2), remaining_distance)])
 
 
 def remaining_distance(figure: "Figure") -> None:
@@ -52,8 +52,8 @@ def remaining_distance(figure: "Figure") -> None:
     axes: list[Axes] = list(figure.subplots(1, len(MASSES_KG), sharey=True))
     for axis, mass, colour in zip(axes, MASSES_KG, COLOURS, strict=True):
         _panel(axis, courses[mass], mass, colour)
+        legend_below(axis)
     axes[0].set_ylabel("remaining distance / mm")
-    axes[0].legend(loc="lower left", fontsize=7)
 
 
 def _courses() -> dict[float, list[list[float]]]:
@@ -93,4 +93,4 @@ def _panel(axis: "Axes", courses: list[list[float]], mass: float, colour: str) -
     axis.set_xlabel("tap")
     axis.set_xticks(range(0, max(map(len, courses)), 1 if max(map(len, courses)) < 9 else 2))
     # no course is inside before its second tap: the place is free
-    axis.text(-0.15, 0.75e3 * TOLERANCE_M, "inside ±10 µm", va="top", fontsize=7, color=GREY)
+    axis.text(-0.15, 0.75e3 * TOLERANCE_M, "inside\n±10 µm", va="top", fontsize=7, color=GREY)

@@ -1,0 +1,55 @@
+"""Colours tell nothing that shape or label does not, and no legend lies on what was measured."""
+
+from collections.abc import Callable
+
+import matplotlib as mpl
+import pytest
+from matplotlib.figure import Figure
+
+from impactcell.figures import diagnostics, friction, positioning
+from impactcell.figures._style import COLOURS, STYLE
+
+AS_PRINTED = 200
+"""Points of the curves that go through the marks of figure 3, which tell them apart."""
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[[Figure], None]], Figure]:
+    """Draw a figure, of few taps and tasks."""
+    monkeypatch.setattr(friction, "SHOTS", 2)
+    course = [[20e-3, 1e-3, 4e-6]] * (positioning.LEARNING + 1)
+    monkeypatch.setattr(positioning, "_courses", lambda: dict.fromkeys(positioning.MASSES_KG, course))
+
+    def draw(make: Callable[[Figure], None]) -> Figure:
+        figure = Figure(figsize=(7.2, 3.2))
+        make(figure)
+        figure.draw_without_rendering()
+        return figure
+
+    return draw
+
+
+@pytest.mark.parametrize(
+    "make", [friction.response, friction.force_and_distance, friction.errors, diagnostics.along_stroke]
+)
+def test_curves_of_different_colour_differ_in_print(
+    drawn: Callable[[Callable[[Figure], None]], Figure], make: Callable[[Figure], None]
+) -> None:
+    with mpl.rc_context(STYLE):
+        for axes in drawn(make).axes:
+            told: dict[tuple[object, ...], set[object]] = {}
+            for line in axes.get_lines():
+                count = len(line.get_xdata())  # type: ignore[arg-type]
+                if line.get_color() in COLOURS and count > 1 and count != AS_PRINTED:
+                    dashes = line._unscaled_dash_pattern  # type: ignore[attr-defined]
+                    look = line.get_linestyle(), line.get_marker(), repr(dashes)
+                    told.setdefault(look, set()).add(line.get_color())
+            assert all(len(colours) == 1 for colours in told.values()), told
+
+
+def test_legends_of_positioning_are_below(drawn: Callable[[Callable[[Figure], None]], Figure]) -> None:
+    with mpl.rc_context(STYLE):
+        for axes in drawn(positioning.remaining_distance).axes:
+            legend = axes.get_legend()
+            assert legend is not None
+            assert not legend.get_window_extent().overlaps(axes.bbox)
