@@ -45,22 +45,23 @@ class Shop:
     watched: Watched
     directory: Path
     module: SteppedModule
+    cell: str = CELL
 
     @property
     def page(self) -> str:
-        return self.watched.service.pages[CELL]
+        return self.watched.service.pages[self.cell]
 
     @property
     def endpoint(self) -> str:
-        return self.watched.service.endpoints[CELL]
+        return self.watched.service.endpoints[self.cell]
 
     @property
     def last(self) -> Snapshot:
-        return self.watched.snapshots[CELL][-1]
+        return self.watched.snapshots[self.cell][-1]
 
     def audit(self) -> tuple[AuditEntry, ...]:
         """What people did, as the journal has it."""
-        with Journal(self.directory / f"{CELL}.sqlite", CELL, read_only=True) as journal:
+        with Journal(self.directory / f"{self.cell}.sqlite", self.cell, read_only=True) as journal:
             return journal.audit()
 
     async def beside(self, work: Callable[[], T]) -> T:
@@ -69,18 +70,20 @@ class Shop:
 
 
 @contextlib.asynccontextmanager
-async def at_work(directory: Path, cycles: int, scenario: dict[str, Any], **cell: Any) -> AsyncIterator[Shop]:
+async def at_work(
+    directory: Path, cycles: int, scenario: dict[str, Any], name: str = CELL, **cell: Any
+) -> AsyncIterator[Shop]:
     """Run a cell with its page that has so many cycles behind it and goes on striking."""
     write_shop_users(directory)
     async with stepped(**scenario) as module:
-        file = write_cell(directory, module.port, CELL, web={"endpoint": "http://127.0.0.1:0"}, **cell)
+        file = write_cell(directory, module.port, name, web={"endpoint": "http://127.0.0.1:0"}, **cell)
         async with serving(file) as watched:
             for made in range(1, cycles + 1):
                 module.strike()
-                await watched.until(CELL, made)
+                await watched.until(name, made)
             striking = asyncio.create_task(_go_on(module))
             try:
-                yield Shop(watched, directory, module)
+                yield Shop(watched, directory, module, name)
             finally:
                 striking.cancel()
 

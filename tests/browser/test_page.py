@@ -14,11 +14,13 @@ from impactcell.scada import Role
 from impactcell.scada.users import User, read_users, with_password, write_users
 from impactcell.web import system_page
 from tests.browser.chromium import DESK, PHONE, WALL, Browser, need_chromium
-from tests.browser.shop import CELL, PASSWORDS, Shop, at_work, enter, judge
+from tests.browser.shop import PASSWORDS, Shop, at_work, enter, judge
 from tests.opcua_server import PatientClient
 
 pytestmark = [pytest.mark.browser, pytest.mark.asyncio(loop_scope="module")]
 
+CELL = "press-hall-4_line-2_station-17_carbide-table-north-of-two.second"
+"""As long as the name of a cell may be."""
 PAGES = {
     "cells": "/",
     "cell": f"/cells/{CELL}",
@@ -45,7 +47,7 @@ async def shop(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Shop]:
     }
     directory = tmp_path_factory.mktemp("shop")
     alarms, signature = {"wear_limit": 0.21}, {"learning_cycles": 10}
-    async with at_work(directory, 20, scenario, alarms=alarms, signature=signature) as shop:
+    async with at_work(directory, 20, scenario, CELL, alarms=alarms, signature=signature) as shop:
         yield shop
 
 

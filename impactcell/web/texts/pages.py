@@ -70,7 +70,7 @@ PAGE_TEXTS: Texts = {
         "Abweichung zwischen Modell und Messung; 1 ist, was das Rauschen der Sensoren allein ausmacht.",
     ),
     "plus_minus_help": (
-        f"± is {TOLD_STDS:g} standard deviations: the true value is within with about 95 % certainty.",
+        f"± is {TOLD_STDS:g} standard deviations: with about 95 % certainty the true value lies within.",
         f"± sind {TOLD_STDS:g} Standardabweichungen: mit etwa 95 % Sicherheit liegt der wahre Wert darin.",
     ),
     # a cell's page
