@@ -102,6 +102,8 @@ def german_equation(equation: str) -> str:
     """
     names = {**GERMAN_QUANTITIES, **GERMAN_STATES}
     said = re.sub(r" with (?=s\()", " mit ", with_decimal_commas(equation))
+    said = said.replace("u a column of shots.csv", "u = Spalte von shots.csv")
+    said = said.replace("the part that differs: ", "davon der Unterschied: ")
     return re.sub(r"\b([uw]) the (\w+)", lambda m: f"{m[1]} = {names.get(m[2], m[2])}", said)
 
 

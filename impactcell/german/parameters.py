@@ -16,24 +16,43 @@ UNIT_PARTS: Final = {"n", "m", "m2", "s", "s2", "rad", "per"}
 """What the unit at the end of a parameter's name is made of."""
 GERMAN: Final = {
     "amplitude": "Amplitude",
+    "asymmetric coefficient": "richtungsabhängiger Koeffizient",
+    "centre": "Mitte",
+    "cosine amplitude": "Kosinusamplitude",
+    "cubic stiffness": "kubische Steifigkeit",
     "damping": "Dämpfung",
     "delay": "Verzögerung",
     "drag coefficient": "Widerstandsbeiwert",
     "exponent": "Exponent",
     "force": "Kraft",
+    "force gain": "Skalenfehler der Kraft",
+    "force offset": "Nullpunktfehler der Kraft",
+    "force per covariate": "Kraft je Einflussgröße",
+    "friction": "Reibung",
+    "friction gradient": "Gradient der Reibung",
     "friction increase": "Zunahme der Reibung",
+    "friction per covariate": "Reibung je Einflussgröße",
     "gradient": "Gradient",
+    "gravity torque": "Schweremoment",
     "increase per decade": "Zunahme je Dekade",
+    "inertia": "Trägheit",
     "limit": "Grenze",
+    "load coefficient": "Lastbeiwert",
     "offset": "Versatz",
     "period": "Periode",
     "phase": "Phase",
     "position": "Position",
+    "position eccentricity cosine": "Exzentrizität (Kosinus)",
+    "position eccentricity sine": "Exzentrizität (Sinus)",
+    "position offset": "Nullpunktfehler der Position",
+    "presliding length": "Vorgleitlänge",
     "ramp time": "Anlaufzeit",
     "range": "Reichweite",
     "relative amplitude": "relative Amplitude",
     "relative change": "relative Änderung",
     "relative error": "relativer Fehler",
+    "scale": "Maßstab",
+    "sine amplitude": "Sinusamplitude",
     "speed loss": "Geschwindigkeitsverlust",
     "stiffness": "Steifigkeit",
     "stribeck velocity": "Stribeck-Geschwindigkeit",
@@ -43,6 +62,15 @@ GERMAN: Final = {
     "width": "Breite",
 }
 """By the words in English; what is not here stays English."""
+
+
+def words_of(name: str, language: str) -> str:
+    """Words of a parameter's name without its unit."""
+    stem, _, number = name.rpartition("_")
+    if stem and number.isdigit():
+        return f"{words_of(stem, language)} {number}"
+    words = name.replace("_", " ")
+    return GERMAN.get(words, words) if language == "de" else words
 
 
 def parameter_words(effect: str, name: str, language: str) -> tuple[str, str]:
@@ -56,8 +84,7 @@ def parameter_words(effect: str, name: str, language: str) -> tuple[str, str]:
     ('Dämpfung', 'N s/m')
     """
     words, unit = PLANT.get(name, (name, "")) if not effect else _of_effect(effect, name)
-    words = words.replace("_", " ")
-    return (GERMAN.get(words, words) if language == "de" else words), unit
+    return words_of(words, language), unit
 
 
 def _of_effect(effect: str, name: str) -> tuple[str, str]:

@@ -11,6 +11,13 @@ from tests.browser.chromium import DESK, PHONE, Browser
 from tests.browser.shop import judge
 from tests.discrepancy.test_machine_laws import SLIDE_FILE, slide
 
+CUT_OFF = """
+    const tables = [...document.querySelectorAll(".wide")].filter((place) => place.querySelector("table"));
+    return tables.filter((box) => box.scrollWidth > box.clientWidth + 1).map((box) => box.innerText);
+"""
+"""Tables that are wider than their place."""
+GROUND = "return Math.max(...getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number))"
+"""Brightness of the page's ground, to 255."""
 pytestmark = pytest.mark.browser
 
 
@@ -24,10 +31,13 @@ def test_the_report_of_a_machine(browser: Browser, tmp_path: Path) -> None:
     assert ended.value.code == 0
     pictures = Path(os.environ.get("IMPACTCELL_SCREENSHOTS") or tmp_path)
     faults = []
-    for suffix, size in (("light", DESK), ("phone", PHONE)):
-        browser.show_as("light", size)
-        browser.open((tmp_path / "found" / "report.html").as_uri())
-        faults += judge(browser, "machine", pictures / f"report-machine-{suffix}.png", size[0])
+    for suffix, theme, size in (("light", "light", DESK), ("phone", "light", PHONE), ("dark", "dark", PHONE)):
+        for name in ("report.de.html", "report.html"):
+            browser.show_as(theme, size)
+            browser.open((tmp_path / "found" / name).as_uri())
+            faults += judge(browser, name, pictures / f"{name}-machine-{suffix}.png", size[0])
+            faults += [f"{name} on {suffix}: {text}" for text in browser.run(CUT_OFF)]
+            assert (browser.run(GROUND) < 64) is (theme == "dark")
     assert not faults
     assert "A noise floor is the difference" in browser.text
     assert "-0.0 %" not in browser.text

@@ -8,11 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from impactcell.campaign import Excitation
+from impactcell.campaign import Coordinate, Excitation
 from impactcell.discrepancy.data import CHANNELS
 from impactcell.discrepancy.data.prepared_campaign import STRATEGIES
 from impactcell.discrepancy.data.prepared_shots import OWN_COVARIATES
-from impactcell.discrepancy.report import german_sentences, sentences
+from impactcell.discrepancy.machine import CATALOGUE, ECCENTRICITY
+from impactcell.discrepancy.report import german_machine_sentences, german_sentences, sentences
+from impactcell.discrepancy.report.machine_parameters import (
+    SYMBOLS,
+    machine_parameter_words,
+    parameter_name,
+    parameter_rows,
+)
 from impactcell.discrepancy.report.page import SENTENCES, write_reports
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.german.findings import GERMAN_PHASES, REPORTS, with_decimal_commas
@@ -110,6 +117,56 @@ def test_every_parameter_of_the_library_has_german_words_and_its_unit() -> None:
             assert unit == german_unit == ("" if parameter.unit == "1" else units[parameter.unit])
             assert "_" not in english
             assert german in GERMAN.values(), english
+
+
+@pytest.mark.parametrize("coordinate", Coordinate)
+def test_every_parameter_of_a_machine_has_words_in_both_languages_and_its_unit(
+    coordinate: Coordinate,
+) -> None:
+    symbols = SYMBOLS[coordinate]
+    units = {
+        parameter_name(name, unit, coordinate): ""
+        if unit == "1"
+        else unit.format(F=symbols["force"], q=symbols["q"])
+        for term in CATALOGUE.values()
+        for name, unit in term.strengths
+    }
+    speed = f"stribeck_velocity_{symbols['q']}_per_s"
+    units |= {speed: f"{symbols['q']}/s", f"period_{symbols['q']}": symbols["q"], "delay_s": "s"}
+    units |= {
+        "inertia": "kg m²" if coordinate is Coordinate.ROTATION else "kg",
+        "gravity_torque": symbols["force"],
+    }
+    units |= {f"{ECCENTRICITY}_sine": symbols["q"], "position_offset": symbols["q"], "force_gain": ""}
+    units |= {f"amplitude_2_{symbols['F']}": symbols["force"], "centre": "", "scale_2": ""}
+    for name, unit in units.items():
+        english, german = (machine_parameter_words(name, coordinate, language) for language in ("en", "de"))
+        assert english[1] == german[1] == unit, name
+        assert "_" not in english[0]
+        assert re.sub(r" \d$", "", german[0]) in GERMAN.values(), english
+
+
+def test_a_parameter_of_the_base_model_is_told_with_its_term() -> None:
+    stated = {"coulomb_friction.friction_n": {"value": 2.0}, "inertia": {"value": 1.0}}
+    rows = parameter_rows((("", stated),), Coordinate.TRANSLATION, "de")
+    assert [(row["term"], row["words"], row["unit"]) for row in rows] == [
+        ("coulomb_friction", "Reibung", "N"),
+        ("", "Trägheit", "kg"),
+    ]
+
+
+def test_laws_of_a_machine_and_where_they_come_from_are_said_in_german() -> None:
+    told = " ".join(
+        f"{german_machine_sentences.equation(term.equation)} "
+        f"{german_machine_sentences.reference(term.reference)}"
+        for term in CATALOGUE.values()
+    )
+    for word in ("the", "of", "a column", "part that", "and", "by", "in the", "or", "motor or"):
+        assert not re.search(rf"\b{word}\b", told), word
+    assert "u = Spalte von shots.csv" in told
+    assert german_machine_sentences.phrase("law_of_force_over_speed(u^2)") == (
+        "Gesetz: Kraft über der Geschwindigkeit (u^2)"
+    )
 
 
 @pytest.mark.parametrize(

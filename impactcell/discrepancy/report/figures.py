@@ -24,8 +24,12 @@ RESIDUAL_SCALE = 10.0
 """Residuals are drawn over ± this many standard deviations of the noise at least: noise alone looks thin."""
 FACTOR_SCALE_PERCENT = 5.0
 """Friction factors are drawn over ± this at least [%]: one per cent, usual from shot to shot, looks small."""
-# Style of all figures; the salt makes the ids in an SVG the same in every run.
+# Style of all figures: they stand on the page's own ground, which may be dark; the salt makes ids in an SVG
+# the same in every run.
 STYLE: Any = {
+    "figure.facecolor": "none",
+    "savefig.facecolor": "none",
+    "axes.facecolor": "none",
     "font.family": "sans-serif",
     "font.size": 9,
     "axes.edgecolor": "#8a97a3",

@@ -11,7 +11,7 @@ from impactcell.discrepancy.report.machine_sentences import law_equation
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import german_open_loop_sentence
 
-__all__ = ["equation", "headline", "label", "note", "phrase", "reason", "setting", "written"]
+__all__ = ["equation", "headline", "label", "note", "phrase", "reason", "reference", "setting", "written"]
 _SETTINGS: Final[Patterns] = (
     (r"^nothing from a fifth to twice of what was done .*",
      ("nichts vom Fünftel bis zum Doppelten des Bisherigen unterscheidet sie: eines von beiden für sich "
@@ -27,6 +27,16 @@ _SETTINGS: Final[Patterns] = (
     (r", as often each$", ", je gleich oft"),
 )  # fmt: skip
 """What to record next."""
+_REFERENCES: Final = {
+    "Coulomb 1785, normal force by u": "Coulomb 1785, Normalkraft nach u",
+    "Stribeck 1902; Bo and Pavelescu 1982": "Stribeck 1902; Bo und Pavelescu 1982",
+    "cogging of a motor or gear": "Rasten eines Motors oder Getriebes",
+    "force by pressure or current": "Kraft durch Druck oder Strom",
+    "found in the records": "in den Messungen gefunden",
+    "linear in the place": "linear im Ort",
+    "periodic in the place": "periodisch im Ort",
+}
+"""Where a law comes from; what is not here is a name and a year."""
 
 
 def headline(finding: MachineFinding) -> str:
@@ -70,6 +80,11 @@ def headline(finding: MachineFinding) -> str:
     fit = finding.simulated[-1].fit_percent
     follows = german_open_loop_sentence(channel_name(finding.base.response), fit)
     return f"{written(said)} {follows}".rstrip()
+
+
+def reference(english: str) -> str:
+    """Say where a law comes from."""
+    return _REFERENCES.get(english, english)
 
 
 def setting(english: str) -> str:

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from impactcell.discrepancy.machine import LAW_PLACES
 from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, GERMAN_STATES, german_texts
 
 WORDS: Final = {
@@ -53,7 +54,11 @@ def term_name(name: str) -> str:
 
     >>> term_name("covariate_friction(pressure_bar)"), term_name("viscous_friction")
     ('Reibung je Einflussgröße (pressure_bar)', 'Viskose Reibung')
+    >>> term_name("law_of_friction_over_load(u^2)")
+    'Gesetz: Reibung über der Last (u^2)'
     """
     identifier, _, column = name.partition("(")
     said = TERMS.get(identifier) or phrase(identifier)
+    if identifier in LAW_PLACES:
+        said = f"Gesetz: {TERMS[LAW_PLACES[identifier]]}"
     return f"{said} ({column}" if column else said

@@ -10,7 +10,8 @@ import numpy as np
 from impactcell.discrepancy.machine import CATALOGUE, VALUES, ChosenTerm, MachineFinding, motions
 from impactcell.discrepancy.report import german_machine_sentences, machine_sentences
 from impactcell.discrepancy.report.law_figures import function_figure
-from impactcell.discrepancy.report.machine_result import SYMBOLS, law_covariate
+from impactcell.discrepancy.report.machine_parameters import SYMBOLS, parameter_rows
+from impactcell.discrepancy.report.machine_result import law_covariate
 from impactcell.discrepancy.report.page import report_environment
 from impactcell.german.findings import REPORTS
 
@@ -31,7 +32,7 @@ def write_machine_reports(
         environment = report_environment(said)
         environment.filters["share"] = lambda part, whole, said=said: said.written(format_share(part, whole))
         template = environment.get_template(f"{name.replace('report', 'machine')}.j2")
-        page = template.render(**machine_page_context(finding, document, source, said))
+        page = template.render(**machine_page_context(finding, document, source, language))
         (directory / name).write_text(page, encoding="utf-8")
 
 
@@ -45,9 +46,10 @@ def format_share(part: float, whole: float) -> str:
 
 
 def machine_page_context(
-    finding: MachineFinding, document: dict[str, Any], source: str, said: ModuleType
+    finding: MachineFinding, document: dict[str, Any], source: str, language: str
 ) -> dict[str, Any]:
     """Everything the template shows."""
+    said, coordinate = MACHINE_SENTENCES[language], finding.base.coordinate
     first = finding.steps[0] if finding.steps else None
     return {
         "source": source,
@@ -58,8 +60,15 @@ def machine_page_context(
         "law_refused": said.reason(finding.law_refused),
         "setting": said.setting,
         "equation": said.equation,
-        "equations": {name: CATALOGUE[name].equation for name in CATALOGUE},
-        "references": {name: CATALOGUE[name].reference for name in CATALOGUE},
+        "equations": {name: said.equation(term.equation) for name, term in CATALOGUE.items()},
+        "references": {name: said.reference(term.reference) for name, term in CATALOGUE.items()},
+        "found": parameter_rows(
+            ((effect["effect"], effect["parameters"]) for effect in document["effects"]), coordinate, language
+        ),
+        "stated": parameter_rows((("", document["nominal"]),), coordinate, language),
+        "of_law": parameter_rows(
+            (("", (document["law"] or {}).get("parameters", {})),), coordinate, language
+        ),
         "records": len(finding.records),
         "established": finding.established,
         "extended": bool(finding.established),

@@ -3,7 +3,6 @@
 import math
 from typing import Any
 
-from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine import (
     COVARIATES,
     ECCENTRICITY,
@@ -16,33 +15,13 @@ from impactcell.discrepancy.machine import (
     OpenLoopError,
     term_of,
 )
+from impactcell.discrepancy.report.machine_parameters import SYMBOLS, parameter_name
 from impactcell.discrepancy.report.machine_sentences import headline, law_equation
 from impactcell.discrepancy.report.result import FORMAT, SPLINE_ONLY, experiments, round_digits
 from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
 
-SYMBOLS = {
-    Coordinate.TRANSLATION: {"force": "N", "F": "n", "q": "m"},
-    Coordinate.ROTATION: {"force": "N m", "F": "n_m", "q": "rad"},
-}
-"""Units of force and coordinate, as they are shown and as they end a parameter's name."""
 ECCENTRIC_PARTS = ("position_eccentricity_cosine", "position_eccentricity_sine")
 """Names of the two amplitudes of an encoder that turns off its centre."""
-SLUGS = {
-    "{F}": "{F}",
-    "{F} s/{q}": "{F}_s_per_{q}",
-    "{F} s²/{q}²": "{F}_s2_per_{q}2",
-    "{F}/{q}": "{F}_per_{q}",
-    "{F}/{q}³": "{F}_per_{q}3",
-    "{F}/u": "{F}_per_unit",
-    "1": "",
-}
-"""How a unit ends a parameter's name."""
-
-
-def parameter_name(name: str, unit: str, coordinate: Coordinate) -> str:
-    """Name of a strength with its SI unit, as `drag_coefficient_n_s2_per_m2`."""
-    slug = SLUGS[unit].format(F=SYMBOLS[coordinate]["F"], q=SYMBOLS[coordinate]["q"])
-    return f"{name}_{slug}" if slug else name
 
 
 def machine_document(finding: MachineFinding) -> dict[str, Any]:

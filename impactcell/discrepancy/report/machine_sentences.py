@@ -5,13 +5,18 @@ from impactcell.discrepancy.report.sentences import equation, label, note, reaso
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import open_loop_sentence
 
-__all__ = ["equation", "headline", "label", "note", "phrase", "reason", "setting", "written"]
+__all__ = ["equation", "headline", "label", "note", "phrase", "reason", "reference", "setting", "written"]
 
 
 def phrase(name: str) -> str:
     """Name of a term as one would say it."""
     identifier, _, column = name.partition("(")
     return identifier.replace("_", " ") + (f" by {column.rstrip(')')}" if column else "")
+
+
+def reference(english: str) -> str:
+    """Say where a law comes from."""
+    return english
 
 
 def headline(finding: MachineFinding) -> str:
