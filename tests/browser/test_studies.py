@@ -6,6 +6,7 @@ import time
 from collections.abc import AsyncIterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 import pytest_asyncio
 import yaml
@@ -71,15 +72,16 @@ def gap(browser: Browser) -> float:
     return float("nan") if text == "–" else float(text.split()[0])
 
 
-def is_report_painted(browser: Browser, picture: Path) -> bool:
-    """Take the picture again, and say whether anything of the report is to be seen in it."""
+def is_report_painted(browser: Browser, picture: Path, theme: str) -> bool:
+    """Take the picture again, and say whether the report is to be seen in it, on the ground of the theme."""
     browser.screenshot(picture)
     place = "const box = document.querySelector('iframe.report').getBoundingClientRect();"
     x, y, width, height = browser.run(
         f"{place} return [box.x, box.y + scrollY, box.width, box.height].map(Math.round)"
     )
     inside = imread(picture)[y + 10 : y + height - 10, x + 10 : x + width - 10, :3]
-    return inside.size > 0 and float(inside.std()) > 0.0
+    is_painted = inside.size > 0 and float(inside.std()) > 0.0
+    return is_painted and (float(np.median(inside)) < 0.5) is (theme == "dark")
 
 
 async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Browser, tmp_path: Path) -> None:
@@ -149,7 +151,11 @@ async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Brows
             browser.show_as(theme, size)
             picture = pictures / f"page-study-{suffix}.png"
             found = judge(browser, "study", picture, size[0])
-            browser.until(lambda: is_report_painted(browser, picture), "the report in its frame")
+            browser.until(lambda: is_report_painted(browser, picture, theme), "the report in its frame")
+            for chosen in ("dark", "light", "auto"):  # whatever the system shows
+                browser.run("document.documentElement.dataset.theme = arguments[0]", chosen)
+                shown = theme if chosen == "auto" else chosen
+                browser.until(lambda shown=shown: is_report_painted(browser, picture, shown), "its colours")
             # As a file: the page shows it in a sandbox in which nothing runs, not even what judges it.
             browser.open(next(shop.directory.rglob("report.html")).as_uri())
             found += judge(browser, "report", pictures / f"report-{suffix}.png", size[0])

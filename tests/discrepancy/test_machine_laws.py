@@ -21,6 +21,7 @@ from impactcell.discrepancy.machine import (
     OpenLoopError,
     Response,
     investigate_machine,
+    investigation,
     law_search,
     simulate_held_out,
 )
@@ -186,7 +187,7 @@ def test_a_swing_is_simulated_nearer_with_the_law_of_the_place_that_pushes(
         return simulate_held_out(finding, model)
 
     monkeypatch.setattr(law_search, "simulate_held_out", counted)
-    monkeypatch.setattr(machine_result, "simulate_held_out", counted)
+    monkeypatch.setattr(investigation, "simulate_held_out", counted)
     finding = investigate_machine(pendulum(1e-3), PENDULUM)
     law = finding.law
     assert law is not None
