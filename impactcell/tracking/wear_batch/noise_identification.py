@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from impactcell.numerics.scatter_correlation import variance_over_scatter
 from impactcell.records import Samples
 from impactcell.tracking.wear_batch import noise_scale, run_length_bank, wear_filter
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale
@@ -34,7 +35,8 @@ LEVEL_WALKS = (0.0, 0.01, 0.03, 0.1, 0.3)
 SLOPE_WALKS = (0.0, 1e-5, 1e-4, 1e-3)
 """Random walks of the slope that are tried, in the same unit."""
 CLEARLY = 5.0
-"""Nats by which a random walk must be more likely than none: a Bayes factor of 150 (Kass & Raftery 1995)."""
+"""Nats by which a random walk must be more likely than none: a Bayes factor of 150 (Kass & Raftery 1995); of
+correlated scatter so many for each of the cycles that count as one."""
 
 INDEX, VALUE, STD, BATCH_CHANGE, BATCH = range(5)
 """Columns of a `CommissioningRecord`."""
@@ -124,12 +126,13 @@ def identify_random_walks(
     def likelihood(walks: RandomWalks) -> float:
         return replay_bank(settings, record, noise, walks).log_likelihood
 
+    clearly = CLEARLY * variance_over_scatter(noise.variogram.correlation)
     best = RandomWalks(settings.level_noise, settings.slope_noise)
     for name, scales in (("level", LEVEL_WALKS), ("slope", SLOPE_WALKS)):
         none = best
         for scale in scales:
             tried = none._replace(**{name: scale})
-            if likelihood(tried) > max(likelihood(best), likelihood(none) + CLEARLY):
+            if likelihood(tried) > max(likelihood(best), likelihood(none) + clearly):
                 best = tried
     return best
 

@@ -56,7 +56,8 @@ def compare_models(
     log_odds = noise_scale.log_odds_of_growth(cycle.noise)
     model = batch_filter.bank_model(settings, state, cycle)
     taken, statistic = walk_models.take_in(models, model, state.accepted, log_odds)
-    models, updated = walk_models.believing(taken, log_odds), replace(updated, statistic=statistic)
+    models = walk_models.believing(taken, log_odds, cycle.noise.variogram.correlation)
+    updated = replace(updated, statistic=statistic)
     place = models.believed
     if place == taken.believed:
         return replace(state, walk_models=models), cycle, updated, []

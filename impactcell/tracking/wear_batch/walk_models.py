@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from impactcell.numerics.scatter_correlation import variance_over_scatter
 from impactcell.records import Samples
 from impactcell.tracking.wear_batch import run_length_bank
 from impactcell.tracking.wear_batch.run_length_model import BankModel, Measurement
@@ -26,7 +27,8 @@ GROWN = 2.0
 """Factor by which the scatter may have grown."""
 CLEARLY = 6.0
 """Nats by which another walk must have become more likely: of white scatter 3.6 at most in 160 000 cycles, of
-batches of 300 cycles 6.9."""
+batches of 300 cycles 6.9. Where scatter is correlated so many for each of the cycles that count as one: its
+variance is known less well, and what it lacks looks like a walk; by 0.7, taken for 0.6, up to 15."""
 CERTAINLY = 2.3
 """Nats by which a larger scatter must be more probable to be believed: ten to one."""
 TOGETHER = 32
@@ -141,9 +143,18 @@ def take_in(models: WalkModels, model: BankModel, accepted: int, log_odds: float
     return taken, statistic
 
 
-def believing(models: WalkModels, log_odds: float) -> WalkModels:
-    """Believe the model that has become clearly more likely, if one has."""
-    bounds = np.full(len(models.evidence), CLEARLY)
+def believing(models: WalkModels, log_odds: float, correlation: float) -> WalkModels:
+    """Believe the model that has become clearly more likely, if one has.
+
+    Parameters
+    ----------
+    log_odds : float
+        See `take_in`.
+    correlation : float
+        Of the scatter from cycle to cycle: what is taken for less than it is looks like a walk.
+    """
+    walks = models.variances[:, :-1].any(axis=1)
+    bounds = np.where(walks, CLEARLY * variance_over_scatter(correlation), CLEARLY)
     bounds[-1] = CERTAINLY - log_odds
     likeliest = int(np.argmax(models.evidence - bounds))
     if models.evidence[likeliest] <= bounds[likeliest]:

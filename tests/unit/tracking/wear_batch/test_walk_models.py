@@ -55,7 +55,7 @@ def believed(values):
     found = [(0.0, 0.0)]
     for cycle, value in enumerate(values[1:], 1):
         models, _ = taken_in(models, value, cycle)
-        models = walk_models.believing(models, NEVER)
+        models = walk_models.believing(models, NEVER, 0.0)
         level, slope, _ = np.sqrt(models.variances[models.believed])
         found.append((float(level), float(slope)))
     return found
@@ -185,14 +185,32 @@ def test_a_larger_scatter_is_believed_where_it_is_ten_times_as_probable():
     last = len(models.variances) - 1
     for nats, expected in ((2.2, 0), (2.4, last)):
         evidence = np.append(np.zeros(last), nats - np.log(1e-4))
-        likelier = walk_models.believing(replace(models, evidence=evidence), np.log(1e-4))
+        likelier = walk_models.believing(replace(models, evidence=evidence), np.log(1e-4), 0.0)
         assert likelier.believed == expected
+
+
+@pytest.mark.parametrize(("correlation", "worth"), [(0.0, 1.0), (0.5, 3.0), (0.8, 9.0)])
+def test_of_correlated_scatter_a_walk_is_asked_for_as_many_nats_more_as_cycles_are_worth_less(
+    correlation, worth
+):
+    """A mean of n has the variance of one of n / worth that are independent; a walk ends as it does else."""
+    models = walk_models.begin(first_bank(0.0), (0.0, 0.0), (0.0, 0.0), 1.0)
+    for believed_now, likelier, nats, expected in (
+        (0, 3, 0.99 * worth, 0),
+        (0, 3, 1.01 * worth, 3),
+        (3, 0, 0.99, 3),
+        (3, 0, 1.01, 0),
+    ):
+        evidence = np.zeros(len(models.variances))
+        evidence[likelier] = nats * walk_models.CLEARLY
+        asked = replace(models, believed=believed_now, evidence=evidence)
+        assert walk_models.believing(asked, NEVER, correlation).believed == expected
 
 
 def test_a_scatter_grows_beside_the_walk_that_is_believed():
     models = walk_models.begin(first_bank(0.0), (0.0, 0.0), (0.0, 0.0), 1.0)
     evidence = np.array([0.0, 0.0, 10.0, 0.0, 0.0, 0.0])
-    walking = walk_models.believing(replace(models, evidence=evidence), NEVER)
+    walking = walk_models.believing(replace(models, evidence=evidence), NEVER, 0.0)
     assert walking.believed == 2
     np.testing.assert_allclose(walking.variances[-1], [0.1**2, 0.0, 4.0])
     assert not walking.evidence.any()
