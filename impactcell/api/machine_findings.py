@@ -55,11 +55,11 @@ def write_machine_findings(finding: MachineFinding, data: Campaign, output: Path
         (beside / "result.json").write_text(json_text(document), encoding="utf-8")
         text = base_model_text(extended, data.excitation, provenance)
         (beside / "model.extended.yaml").write_text(text, encoding="utf-8")
-        law = None if finding.law is None else finding.law.choice
-        if law is not None:
-            proposed = replace(extended, terms=(*terms, law))
+        law = finding.law
+        if law is not None and law.choice is not None:
+            proposed = replace(law.model.base, terms=(*terms, law.choice))
             text = base_model_text(proposed, data.excitation, provenance)
-            (beside / f"{law.identifier}.yaml").write_text(text, encoding="utf-8")
+            (beside / f"{law.place}.yaml").write_text(text, encoding="utf-8")
         write_machine_reports(finding, document, source, beside)
 
     write_files(output, write)

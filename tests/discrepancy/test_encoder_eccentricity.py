@@ -1,16 +1,19 @@
 """An encoder off its centre: scipy's integrator swings the pendulum, the angle is bent afterwards."""
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from impactcell.api.machine_findings import write_machine_findings
 from impactcell.campaign import Excitation
 from impactcell.discrepancy.machine import (
     ECCENTRICITY,
     MachineFinding,
+    NumberPrior,
     Response,
     investigate_machine,
     simulate_held_out,
@@ -18,8 +21,9 @@ from impactcell.discrepancy.machine import (
 from impactcell.discrepancy.report import machine_result
 from impactcell.errors import SettingsError
 from impactcell.records import Capture, Channel
-from impactcell.settings.base_model import base_model_text
+from impactcell.settings.base_model import base_model_text, read_base_model
 from tests.discrepancy.test_base_model import NOISE, PENDULUM, base_of, pendulum, swings
+from tests.discrepancy.test_machine_laws import pendulum as pushed
 
 COSINE, SINE = 2.0e-3, -1.2e-3
 """Of the encoder [rad]."""
@@ -81,6 +85,30 @@ def test_no_law_of_the_machine_is_made_of_what_the_encoder_may_be(tmp_path: Path
     finding = investigate_machine(pendulum(bent(swings(4e-4), COSINE, 0.0)), base_of(tmp_path, PENDULUM))
     assert finding.law is None
     assert "position_eccentricity" in finding.law_refused
+
+
+def test_a_law_of_the_machine_is_found_beside_what_the_encoder_may_be(tmp_path: Path) -> None:
+    """A place that pushes, read by an encoder off its centre that the base model does not have."""
+    campaign = pendulum(bent(pushed(1e-3).shots, COSINE, SINE))
+    finding = investigate_machine(campaign, base_of(tmp_path, PENDULUM))
+    law = finding.law
+    assert law is not None, finding.law_refused
+    assert law.place == "law_of_force_over_position"
+    assert law.fall.after < 1.3
+    assert law.simulated is not None
+    without, with_it = (error.rmse for error in law.simulated)
+    assert with_it < 10.0 * NOISE < without
+    assert without <= simulate_held_out(finding, finding.final).rmse
+    for number, truth in enumerate((COSINE, SINE)):
+        place = law.model.fit.columns.index((ECCENTRICITY, 0.0, number))
+        assert law.model.fit.low[place] < truth < law.model.fit.high[place]
+    assert any("law is of what is left beside it" in note for note in finding.notes)
+    write_machine_findings(finding, campaign, tmp_path / "found", "campaign")
+    again, _ = read_base_model(tmp_path / "found" / f"{law.place}.yaml")
+    assert again.position_eccentricity == NumberPrior(0.0, math.inf)
+    assert again.terms[-1] == law.choice
+    extended, _ = read_base_model(tmp_path / "found" / "model.extended.yaml")
+    assert extended.position_eccentricity.is_held
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,10 @@
 import json
 import math
 import re
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,6 +28,7 @@ from impactcell.discrepancy.machine import (
     simulate_held_out,
 )
 from impactcell.discrepancy.machine.finding import FittedModel
+from impactcell.discrepancy.machine.free_splines import FreeSpline
 from impactcell.discrepancy.report import machine_result
 from impactcell.errors import CampaignError, SettingsError
 from impactcell.german.findings import with_decimal_commas
@@ -93,6 +96,26 @@ def test_a_bump_of_friction_is_found_at_its_place() -> None:
     function = sum(size * part for size, part in zip(sizes, parts, strict=True))
     error = (function - np.mean(function)) - (truth - truth.mean())
     assert np.abs(error).max() < 0.1 * 0.6
+
+
+def test_a_place_that_holds_is_not_lost_to_one_that_helps_in_a_single_block(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    best_spline = law_search.best_spline
+
+    def helping(*given: Any) -> FreeSpline:
+        spline = best_spline(*given)
+        if spline.form != "friction_over_speed":
+            return spline
+        gains = np.zeros(spline.gains.size)
+        gains[0] = 1e3
+        return replace(spline, gains=gains)
+
+    monkeypatch.setattr(law_search, "best_spline", helping)
+    law = investigate_machine(slide(0.6), SLIDE).law
+    assert law is not None
+    assert law.place == "law_of_friction_over_position"
+    assert law.rival_places == ("law_of_friction_over_speed",)
 
 
 def test_no_law_is_looked_for_where_nothing_remains() -> None:

@@ -1,9 +1,9 @@
 """What remains of a machine's records as a function of speed, load or position that nobody had listed.
 
-A smooth spline is fitted in each place, as smooth as blocks that it was not fitted to want it. The place that
-predicts them best is condensed: near the spline the squared residuals are a quadratic function of its
-coefficients, functional forms are projected on it, and the best are fitted by themselves. Held-out blocks and
-the held-out simulation decide.
+A smooth spline is fitted in each place, as smooth as blocks that it was not fitted to want it. Of the places
+where that helps block after block the one that helps most is condensed: near the spline the squared residuals
+are a quadratic function of its coefficients, functional forms are projected on it, and the best are fitted by
+themselves. Held-out blocks and the held-out simulation decide.
 """
 
 from collections.abc import Sequence
@@ -12,11 +12,11 @@ from dataclasses import replace
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.laws import RankedForm, rank_forms
 from impactcell.discrepancy.machine.base_model import LawForm, TermChoice
-from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, MachineLaw
+from impactcell.discrepancy.machine.finding import MAX_EXPECTED_GAP, FittedModel, MachineFinding, MachineLaw
 from impactcell.discrepancy.machine.free_splines import best_spline, spline_function, tangent_of, with_spline
 from impactcell.discrepancy.machine.law_terms import LAW_PREFIX, term_of
 from impactcell.discrepancy.machine.machine_fits import MachineFits
-from impactcell.discrepancy.machine.proof import fall_of_gap
+from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
 from impactcell.discrepancy.machine.regression import (
     Blocks,
     fit_blocks,
@@ -44,7 +44,14 @@ ENCODER = (
     "an encoder that turns off its centre does as well as any function of speed, load or position; "
     "position_eccentricity among the nuisances of the base model would tell"
 )
-"""Why no law is proposed where the sensor may be to blame."""
+"""Why no law is proposed where the sensor may be to blame, and nothing helps beside it."""
+BESIDE_ENCODER = (
+    "An encoder that turns off its centre explains as much of what remains as any function of speed, load or "
+    "position; the law is of what is left beside it, and has position_eccentricity among its nuisances."
+)
+"""What is told of a law that was found with the sensor's share taken out."""
+NOTHING_HELPS = "no function of speed, load or position helps block after block that it was not fitted to"
+"""Why no law is proposed where no spline holds."""
 NEGATIVE_SHARE = 0.02
 """Share of the largest friction by which it may be below zero before it gives energy [1]."""
 
@@ -54,30 +61,45 @@ def with_law(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
     if finding.missing_blocks or finding.is_at_floor:
         return finding
     outcome = _find_law(fits, finding)
+    if outcome == ENCODER:
+        beside = _find_law(fits.with_encoder_off_its_centre(), finding)
+        if isinstance(beside, MachineLaw):
+            return replace(finding, law=beside, notes=(*finding.notes, BESIDE_ENCODER))
     if isinstance(outcome, str):
         return replace(finding, law_refused=outcome)
     return replace(finding, law=outcome)
 
 
 def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | str:
+    """Find a law beside the final model, whose nuisances are those of `fits`."""
     own = tuple(term.choice for term in finding.final.terms[len(finding.nominal.terms) :])
     training, held_out, _ = fits.blocks(fits.rows_with(own, splines))
     columns = fits.columns(finding.final.terms)
     fit = fit_blocks(training, columns, fits.priors, fits.nonnegative)
-    model = replace(finding.final, fit=fit)
+    model = replace(finding.final, base=fits.base, fit=fit)
+    expected = expected_gap(held_out, model)[1], MAX_EXPECTED_GAP
+    if gap(held_out, model) <= expected[0] and gap(training, model) <= expected[1]:
+        return NOTHING_HELPS
     before = out_of_fold_losses(training, columns, fits.priors, fits.nonnegative)
     tried = sorted(
         (best_spline(fits, training, model, before, form) for form in _gone_through(finding)),
         key=lambda spline: -float(spline.gains.sum()),
     )
-    best = tried[0]
-    excess = float(before.sum() - training.noise.sum())
-    if mean_over_error(best.gains) < MIN_GAIN_Z or float(best.gains.sum()) < MIN_SHARE * excess:
-        return "no function of speed, load or position helps block after block that it was not fitted to"
+    least = MIN_SHARE * float(before.sum() - training.noise.sum())
+    holding = [
+        spline
+        for spline in tried
+        if mean_over_error(spline.gains) >= MIN_GAIN_Z and float(spline.gains.sum()) >= least
+    ]
+    if not holding:
+        return NOTHING_HELPS
+    best = holding[0]
     if _is_of_the_encoder(fits, training, model, best.gains, before):
         return ENCODER
     rivals = tuple(
-        LAW_PREFIX + other.form for other in tried[1:] if mean_over_error(best.gains - other.gains) < TIE_Z
+        LAW_PREFIX + other.form
+        for other in tried
+        if other is not best and mean_over_error(best.gains - other.gains) < TIE_Z
     )
     tested = finding.scale.ranges[COVARIATES[best.form]]
     smooth = with_spline(fits, training, model, best)
@@ -91,7 +113,10 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | str:
     curve = spline_function(tangent, best.penalty / variance, tested)
     simulated = None
     if chosen is not None and fall.is_real:
-        simulated = simulate_held_out(finding, model), simulate_held_out(finding, law_model)
+        # What else is fitted beside the law may not make its simulation look near.
+        others = [model] if model.base is finding.base else [model, finding.final]
+        nearest = min((simulate_held_out(finding, one) for one in others), key=lambda error: error.rmse)
+        simulated = nearest, simulate_held_out(finding, law_model)
     law = MachineLaw(
         LAW_PREFIX + best.form, tested, curve, chosen, equivalents, rivals, model, law_model, fall, simulated
     )

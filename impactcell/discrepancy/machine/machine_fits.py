@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import lru_cache
+from typing import Self
 
 import numpy as np
 
@@ -73,6 +75,13 @@ class MachineFits:
         self.shapes = {
             choice.name: shape_grid(term_of(choice), self.scale) for choice in (*base.terms, *self.candidates)
         }
+
+    def with_encoder_off_its_centre(self) -> Self:
+        """Leave free how far off its centre the encoder turns."""
+        base = replace(self.base, position_eccentricity=NumberPrior(0.0, math.inf))
+        fits = type(self)(self.records, base, self.candidates, self.held)
+        fits.gravity, fits.delay_s = self.gravity, self.delay_s
+        return fits
 
     def _set_priors(self) -> None:
         for name in NUISANCES:

@@ -110,6 +110,10 @@ NOTES: Final[Patterns] = (
     (r"Nothing pulls back here, and the smallest constant force adds up: .*",
      ("Hier zieht nichts zurück, und die kleinste konstante Kraft summiert sich auf: In der Simulation hat "
       "jede zurückgehaltene Messung eine eigene, mit dem Genannten und ohne es.")),
+    (r"An encoder that turns off its centre explains as much of what remains .*",
+     ("Ein Drehgeber, der außermittig sitzt, erklärt von dem, was bleibt, so viel wie jede Funktion von "
+      "Geschwindigkeit, Last oder Ort; das Gesetz gilt dem, was neben ihm bleibt, und hat "
+      "position_eccentricity unter seinen nuisances.")),
     (r"Simulated open loop, held-out records are (\S+ .+?) off with it, (\S+) without\.",
      r"Ohne Rückführung simuliert liegen zurückgehaltene Messungen mit ihm um \1 daneben, ohne um \2."),
 )  # fmt: skip
