@@ -11,7 +11,8 @@ from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine import finding as machine_finding
 from impactcell.discrepancy.machine import proof, simulation, uniform_records
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
-from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.finding import Remainder
+from impactcell.discrepancy.machine.remainder import remainder_of
 from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
 
 
@@ -77,11 +78,46 @@ def test_the_correlation_time_is_that_which_went_in() -> None:
     averaged = np.array([np.convolve(rng.normal(size=3000), np.ones(m), "valid") for _ in range(2)])
     rows = SimpleNamespace(
         target=averaged.ravel(), columns={}, record=np.repeat([0, 1], averaged.shape[1]),
-        time_s=np.tile(step * np.arange(averaged.shape[1]), 2),
+        time_s=np.tile(step * np.arange(averaged.shape[1]), 2), variance=np.zeros(averaged.size),
     )  # fmt: skip
-    fits: Any = SimpleNamespace(rows=lambda: rows, records=(None, None))
+    assert left_of(rows, shots=(1, 2)).correlation_s == pytest.approx(0.5 * (m + 1) * step, rel=0.3)
+
+
+def left_of(rows: object, shots: tuple[int, ...]) -> Remainder:
+    """What a model without any term leaves."""
     model: Any = SimpleNamespace(fit=SimpleNamespace(columns=(), coefficients=()))
-    assert MachineFits._correlation_time(fits, model) == pytest.approx(0.5 * (m + 1) * step, rel=0.3)
+    records: Any = tuple(SimpleNamespace(shot=shot) for shot in shots)
+    return remainder_of(rows, model, records)  # type: ignore[arg-type]
+
+
+def ringing(sizes: tuple[float, ...], constants: tuple[float, ...]) -> SimpleNamespace:
+    """A wave of each record's own size about its own constant, 100 rows of noise 1 each."""
+    wave = math.sqrt(2.0) * np.sin(2.0 * np.pi * np.arange(100) / 20.0)
+    parts = [size * wave + constant for size, constant in zip(sizes, constants, strict=True)]
+    return SimpleNamespace(
+        target=np.concatenate(parts), columns={}, record=np.repeat(np.arange(len(sizes)), 100),
+        time_s=np.tile(0.01 * np.arange(100), len(sizes)), variance=np.ones(100 * len(sizes)),
+    )  # fmt: skip
+
+
+def test_the_few_records_in_which_most_is_left_are_told() -> None:
+    left = left_of(ringing((2.0, 2.0, 6.0, 2.0, 2.0, 5.0), (0.0,) * 6), shots=(11, 12, 13, 14, 15, 16))
+    assert left.shots == (13, 16)
+    assert left.share == pytest.approx((35.0 + 24.0) / (35.0 + 24.0 + 4 * 3.0))
+    assert left.constant_share == pytest.approx(0.0, abs=1e-12)
+
+
+def test_no_record_is_told_where_all_leave_as_much() -> None:
+    left = left_of(ringing((2.0,) * 6, (0.0,) * 6), shots=(1, 2, 3, 4, 5, 6))
+    assert (left.shots, left.share) == ((), 0.0)
+
+
+def test_what_is_a_constant_of_each_record_is_told_as_such() -> None:
+    """Of mean squares 1 + c² less the noise of 1, c² is the constant's."""
+    left = left_of(ringing((1.0,) * 4, (3.0, -3.0, 3.0, -3.0)), shots=(1, 2, 3, 4))
+    assert left.constant_share == pytest.approx(1.0)
+    left = left_of(ringing((math.sqrt(10.0),) * 4, (3.0, -3.0, 3.0, -3.0)), shots=(1, 2, 3, 4))
+    assert left.constant_share == pytest.approx(0.5)
 
 
 def test_held_out_stretches_are_simulated_from_begin_to_end(monkeypatch: pytest.MonkeyPatch) -> None:

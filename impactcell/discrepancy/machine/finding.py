@@ -77,6 +77,28 @@ class FittedModel:
         return self.value((name, 0.0, 0))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Remainder:
+    """Residuals of the equation of motion, in squares above the sensors' noise.
+
+    Attributes
+    ----------
+    correlation_s : float
+        Time over which they stay alike.
+    shots : tuple of int
+        The few records in which most of them is, the worst first; none where it is spread.
+    share : float
+        How much of them is in these.
+    constant_share : float
+        How much a constant force of each record's own would take.
+    """
+
+    correlation_s: float
+    shots: tuple[int, ...]
+    share: float
+    constant_share: float
+
+
 @dataclass(frozen=True, slots=True)
 class OpenLoopError:
     """Error of a simulation over all held-out stretches.
@@ -158,8 +180,8 @@ class MachineFinding:
         From the nominal to the final model.
     held_spans : tuple of (int, float, float)
         Record and time of each stretch that was held out.
-    correlation_s : float
-        Time over which what remains stays alike.
+    remainder : Remainder
+        What the final model leaves.
     block_s : float
     scale : MotionScale
     notes : tuple of str
@@ -188,7 +210,7 @@ class MachineFinding:
     expected: tuple[float, float]
     fall: FallOfGap
     held_spans: tuple[tuple[int, float, float], ...]
-    correlation_s: float
+    remainder: Remainder
     block_s: float
     scale: MotionScale
     notes: tuple[str, ...]

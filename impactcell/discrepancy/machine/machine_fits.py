@@ -13,6 +13,7 @@ from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, Machi
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
 from impactcell.discrepancy.machine.regression import BLOCKS_OF_RECORD, Blocks, blocks_of, fit_blocks
+from impactcell.discrepancy.machine.remainder import remainder_of
 from impactcell.discrepancy.machine.rival_forms import Basis
 from impactcell.discrepancy.machine.selection import (
     ChosenTerm,
@@ -234,7 +235,7 @@ class MachineFits:
             expected=expected_gap(held_out, before),
             fall=fall_of_gap(held_out, nominal, before, seed),
             held_spans=self._held_spans(),
-            correlation_s=self._correlation_time(final),
+            remainder=remainder_of(self.rows(), final, self.records),
             block_s=self.block_s,
             scale=self.scale,
             notes=tuple(notes),
@@ -272,25 +273,6 @@ class MachineFits:
                 begin = (held[0] % BLOCKS_OF_RECORD) * self.block_s if self.held is None else 0.0
                 spans.append((place, begin, float(record.time_s[-1])))
         return tuple(spans)
-
-    def _correlation_time(self, model: FittedModel) -> float:
-        """Time over which residuals stay alike: the sum of their correlations to the first below 0."""
-        rows = self.rows()
-        residual = rows.target - sum(
-            value * rows.columns[column]
-            for column, value in zip(model.fit.columns, model.fit.coefficients, strict=True)
-        )
-        total, steps = 0.0, []
-        for place in range(len(self.records)):
-            inside = rows.record == place
-            part, time = residual[inside], rows.time_s[inside]
-            if len(part) < 4 or not part.any():
-                continue
-            steps.append(float(np.median(np.diff(time))))
-            correlation = np.correlate(part, part, "full")[len(part) - 1 :] / float(part @ part)
-            below = np.flatnonzero(correlation <= 0.0)
-            total += float(correlation[: below[0] if len(below) else len(correlation)].sum())
-        return total / max(len(steps), 1) * float(np.median(steps)) if steps else math.nan
 
 
 def _alike(candidates: Sequence[TermChoice], kept: Sequence[TermChoice]) -> list[str]:

@@ -47,8 +47,13 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
             "model_error": {
                 "level": round_digits(level),
                 "unit": "1 = noise floor",
-                "correlation_s": round_digits(finding.correlation_s),
+                "correlation_s": round_digits(finding.remainder.correlation_s),
             },
+            "shots": [] if finding.is_at_floor else list(finding.remainder.shots),
+            "share_in_shots": round_digits(0.0 if finding.is_at_floor else finding.remainder.share),
+            "share_of_constants": round_digits(
+                0.0 if finding.is_at_floor else finding.remainder.constant_share
+            ),
         },
         "unexplained": None,
         "gap": {
