@@ -23,17 +23,15 @@ from impactcell.discrepancy.machine.held_out_stretch import (
 )
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.regression import PRIOR_REACH
+from impactcell.discrepancy.machine.smoothing import averaged, smoothed_acceleration, smoothed_speed
 from impactcell.discrepancy.machine.terms import MotionState
-from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord, carried_force
-from impactcell.discrepancy.machine.weak_form import (
-    ECCENTRICITY,
-    averaged,
-    direction_of_motion,
-    eccentricity_waves,
+from impactcell.discrepancy.machine.uniform_records import (
+    MotionScale,
+    UniformRecord,
+    carried_load,
     half_supports,
-    smoothed_acceleration,
-    smoothed_speed,
 )
+from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, direction_of_motion, eccentricity_waves
 from impactcell.records import Samples
 
 STEPS_PER_PERIOD = 200
@@ -71,12 +69,12 @@ def needed_force(model: FittedModel, record: UniformRecord, stretch: slice, scal
     velocity, noise = smoothed_speed(record.position, half_supports(record, scale)[1], record.step_s)
     acceleration = smoothed_acceleration(record.position, half, record.step_s)
     direction = direction_of_motion(velocity, scale, noise * record.noise[0])
-    carried = carried_force(Response.FORCE, record.force, model.gravity * np.sin(record.position))
+    load = carried_load(Response.FORCE, record, record.force, (model.gravity, scale))
     covariates = {
         term.choice.covariate: np.full(velocity.shape, record.covariates.get(term.choice.covariate, 0.0))
         for term in model.terms
     }
-    smooth, friction = _law(model, covariates)(record.position, velocity, np.abs(carried))
+    smooth, friction = _law(model, covariates)(record.position, velocity, load)
     gain = 1.0 + model.nuisance("force_gain")
     gravity = gain * model.base.gravity_torque.value * np.sin(record.position)
     beyond, by_zero = _gravity_deviation(model)
@@ -238,8 +236,8 @@ def motions(finding: MachineFinding) -> list[MotionState]:
     for record in finding.records:
         _, narrow = half_supports(record, finding.scale)
         velocity, _ = smoothed_speed(record.position, narrow, record.step_s)
-        gravity = finding.final.gravity * np.sin(record.position)
-        load = np.abs(carried_force(finding.base.response, record.force, gravity))
+        gravity = finding.final.gravity
+        load = carried_load(finding.base.response, record, record.force, (gravity, finding.scale))
         states.append(MotionState(record.position, velocity, load, np.zeros(velocity.shape)))
     return states
 

@@ -21,7 +21,7 @@ class MotionState:
     position, velocity : ndarray
         [m, m/s] or [rad, rad/s].
     load : ndarray
-        |F + G sin(q - q_0)|: what gear or guide carries [N or N m].
+        |F + G sin(q - q_0)|: what gear or guide carries (`carried_load`) [N or N m].
     covariate : ndarray
         Value of the term's column of `shots.csv`.
     """

@@ -2,19 +2,24 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import binary_opening, median_filter
 
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
+from impactcell.discrepancy.machine.smoothing import smoothed_acceleration
 from impactcell.errors import CampaignError
 from impactcell.features import white_noise_std
 from impactcell.records import Capture, Channel, Samples
 
 MIN_HALF_SUPPORT = 5
 """Least half support of a test function [samples]: fewer do not average the noise of a sensor."""
+PERIODS_PER_SUPPORT = 0.25
+"""Support of a test function over the period of the motion: a half swing has four rows [1]."""
+SPEED_SUPPORT_SHARE = 0.25
+"""Support by which a speed is smoothed, over that of a test function: direction turns fast [1]."""
 LARGEST = 0.995
 """Share of the samples below what counts as the largest: one faulty sample does not set a range [1]."""
 SPIKE_WINDOW = 9
@@ -193,15 +198,15 @@ def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: 
     speed = np.concatenate(speeds)
     period = 2.0 * math.pi * float(np.concatenate(places).std()) / float(np.sqrt(np.mean(speed**2)))
     position = np.concatenate([record.position for record in records])
-    force = np.concatenate([record.force for record in records])
-    load = np.abs(carried_force(response, force, gravity * np.sin(position)))
-    return MotionScale(
+    scale = MotionScale(
         resolving_period(moving, period),
         float(np.quantile(np.abs(speed), LARGEST)),
-        float(np.quantile(load, LARGEST)),
+        0.0,
         float(position.min()),
         float(position.max()),
     )
+    loads = [carried_load(response, record, record.force, (gravity, scale)) for record in records]
+    return replace(scale, load=float(np.quantile(np.concatenate(loads), LARGEST)))
 
 
 def resolving_period(records: Sequence[UniformRecord], period_s: float) -> float:
@@ -251,9 +256,30 @@ def _inertial_force(records: Sequence[UniformRecord], period_s: float) -> float 
     return (total - noise) / count
 
 
-def carried_force(response: Response, force: Samples, gravity_torque: Samples) -> Samples:
-    """Return what gear or guide carries: drive and gravity, or gravity alone where the drive is predicted.
+def half_supports(record: UniformRecord, scale: MotionScale) -> tuple[int, int]:
+    """Half support of a test function and of the smoothing of speeds [samples]."""
+    half = max(int(0.5 * PERIODS_PER_SUPPORT * scale.period_s / record.step_s), MIN_HALF_SUPPORT)
+    half = min(half, len(record.position) // 8)
+    return half, max(int(SPEED_SUPPORT_SHARE * half), 3)
 
-    A measured force holds the friction itself; friction that goes by it would explain any friction.
+
+def carried_load(
+    response: Response, record: UniformRecord, force: Samples, gravity_and_scale: tuple[float, MotionScale]
+) -> Samples:
+    """|F + G sin(q - q_0)|, by which gear or guide is loaded, shape (n,).
+
+    Where the drive is predicted, F is what a machine without friction needs, I q'' + G sin(q - q_0): a
+    measured force holds the friction itself, and friction that goes by it would explain any friction. Nothing
+    is known of a load then where no gravity acts.
     """
-    return gravity_torque if response is Response.FORCE else force + gravity_torque
+    gravity, scale = gravity_and_scale
+    weight = gravity * np.sin(record.position)
+    if response is Response.POSITION:
+        return np.abs(force + weight)
+    if gravity == 0.0:
+        return np.zeros(weight.shape)
+    half, narrow = half_supports(record, scale)
+    accelerating = record.inertia * smoothed_acceleration(
+        record.position, max(half // 2, narrow), record.step_s
+    )
+    return np.abs(accelerating + 2.0 * weight)

@@ -14,12 +14,13 @@ from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.rival_forms import Basis, free_columns, hats
+from impactcell.discrepancy.machine.smoothing import smoothed_speed, test_function
 from impactcell.discrepancy.machine.terms import MotionState, Term
 from impactcell.discrepancy.machine.uniform_records import (
-    MIN_HALF_SUPPORT,
     MotionScale,
     UniformRecord,
-    carried_force,
+    carried_load,
+    half_supports,
     motion_scale,
 )
 from impactcell.records import Samples
@@ -28,10 +29,6 @@ IndexArray = np.ndarray[tuple[int], np.dtype[np.int64]]
 Column = tuple[str, float, int]
 """A column of the regression: its term or nuisance, the value of its shape, and which strength it is."""
 
-PERIODS_PER_SUPPORT = 0.25
-"""Support of a test function over the period of the motion: a half swing has four rows [1]."""
-SPEED_SUPPORT_SHARE = 0.25
-"""Support by which a speed is smoothed, over that of a test function: direction turns fast [1]."""
 TURNING_SPEED_SHARE = 0.005
 """Speed below which the direction of motion counts as between -1 and 1, over the largest [1]."""
 TURNING_NOISES = 2.0
@@ -40,8 +37,6 @@ MAX_RESTING_SHARE = 0.5
 """Share of a row's support at rest beyond which it says nothing of friction: the part may stick [1]."""
 ECCENTRICITY = "position_eccentricity"
 """Columns of an encoder that turns off its centre: e_c and e_s."""
-TEST_FUNCTION_POWER = 4
-"""w = (1 - s²)^4: three derivatives vanish at its ends [1]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,12 +105,12 @@ def _record_rows(
     scale, basis = scale_and_basis
     step = record.step_s
     half, narrow = half_supports(record, scale)
-    weight, curvature = _test_function(half, step)
+    weight, curvature = test_function(half, step)
     velocity, speed_noise = smoothed_speed(record.position, narrow, step)
     force = record.force
     if delay_s:
         force = np.interp(record.time_s + delay_s, record.time_s, force)
-    load = np.abs(carried_force(base.response, force, gravity * np.sin(record.position)))
+    load = carried_load(base.response, record, force, (gravity, scale))
     centres: IndexArray = np.arange(half + narrow, len(force) - half - narrow, half, dtype=np.int64)
     direction = direction_of_motion(velocity, scale, record.noise[0] * speed_noise)
     resting = _averaged((np.abs(direction) < 1.0).astype(np.float64), weight, centres)
@@ -162,13 +157,6 @@ def eccentricity_waves(position: Samples) -> Samples:
     return np.stack([np.cos(position), np.sin(position)])
 
 
-def half_supports(record: UniformRecord, scale: MotionScale) -> tuple[int, int]:
-    """Half support of a test function and of the smoothing of speeds [samples]."""
-    half = max(int(0.5 * PERIODS_PER_SUPPORT * scale.period_s / record.step_s), MIN_HALF_SUPPORT)
-    half = min(half, len(record.position) // 8)
-    return half, max(int(SPEED_SUPPORT_SHARE * half), 3)
-
-
 def direction_of_motion(velocity: Samples, scale: MotionScale, speed_noise: float) -> Samples:
     """-1 or 1, and between them where the part turns or rests, shape (n,)."""
     turning = max(TURNING_SPEED_SHARE * scale.speed, TURNING_NOISES * speed_noise)
@@ -182,39 +170,6 @@ def shape_grid(term: Term, scale: MotionScale) -> tuple[float, ...]:
         return (0.0,)
     size = scale.speed if term.shape.covariate == "speed" else scale.high - scale.low
     return tuple(share * size for share in term.shape.shares)
-
-
-def smoothed_speed(position: Samples, half: int, step: float) -> tuple[Samples, float]:
-    """Differentiate by weighted slopes over `2 half + 1` samples: shape (n,), and noise per noise of one."""
-    # A cubic's slope in its middle: a parabola of the speed within the support leaves no error.
-    lever = np.arange(-half, half + 1.0)
-    second, fourth, sixth = (float(np.sum(lever**power)) for power in (2, 4, 6))
-    weight = (sixth * lever - fourth * lever**3) / (second * sixth - fourth**2)
-    padded = np.pad(position, half, mode="reflect", reflect_type="odd")
-    weight /= step
-    return np.convolve(padded, weight[::-1], "valid"), float(np.sqrt(weight @ weight))
-
-
-def smoothed_acceleration(position: Samples, half: int, step: float) -> Samples:
-    """Second derivative as the rows of the regression have it, shape (n,)."""
-    _, curvature = _test_function(half, step)
-    padded = np.pad(position, half + 1, mode="reflect", reflect_type="odd")
-    return np.convolve(padded, curvature, "valid")
-
-
-def averaged(values: Samples, half: int, step: float) -> Samples:
-    """Mean of a signal as the rows of the regression have it, shape (n,)."""
-    weight, _ = _test_function(half, step)
-    return np.convolve(np.pad(values, half + 1, mode="reflect"), weight, "valid")
-
-
-def _test_function(half: int, step: float) -> tuple[Samples, Samples]:
-    """Weights of a mean, and of the mean second derivative by second differences, shape (2 half + 3,)."""
-    place = np.arange(-half - 1, half + 2) / (half + 1.0)
-    weight = np.maximum(1.0 - place**2, 0.0) ** TEST_FUNCTION_POWER
-    weight /= weight.sum()
-    curvature = np.convolve(weight, [1.0, -2.0, 1.0], "same") / step**2
-    return weight, curvature
 
 
 def _averaged(values: Samples, weight: Samples, centres: IndexArray) -> Samples:

@@ -1,0 +1,41 @@
+"""Speeds, accelerations and means of what is sampled at equal steps, by weights of compact support."""
+
+import numpy as np
+
+from impactcell.records import Samples
+
+TEST_FUNCTION_POWER = 4
+"""w = (1 - s²)^4: three derivatives vanish at its ends [1]."""
+
+
+def smoothed_speed(position: Samples, half: int, step: float) -> tuple[Samples, float]:
+    """Differentiate by weighted slopes over `2 half + 1` samples: shape (n,), and noise per noise of one."""
+    # A cubic's slope in its middle: a parabola of the speed within the support leaves no error.
+    lever = np.arange(-half, half + 1.0)
+    second, fourth, sixth = (float(np.sum(lever**power)) for power in (2, 4, 6))
+    weight = (sixth * lever - fourth * lever**3) / (second * sixth - fourth**2)
+    padded = np.pad(position, half, mode="reflect", reflect_type="odd")
+    weight /= step
+    return np.convolve(padded, weight[::-1], "valid"), float(np.sqrt(weight @ weight))
+
+
+def smoothed_acceleration(position: Samples, half: int, step: float) -> Samples:
+    """Second derivative as the rows of the regression have it, shape (n,)."""
+    _, curvature = test_function(half, step)
+    padded = np.pad(position, half + 1, mode="reflect", reflect_type="odd")
+    return np.convolve(padded, curvature, "valid")
+
+
+def averaged(values: Samples, half: int, step: float) -> Samples:
+    """Mean of a signal as the rows of the regression have it, shape (n,)."""
+    weight, _ = test_function(half, step)
+    return np.convolve(np.pad(values, half + 1, mode="reflect"), weight, "valid")
+
+
+def test_function(half: int, step: float) -> tuple[Samples, Samples]:
+    """Weights of a mean, and of the mean second derivative by second differences, shape (2 half + 3,)."""
+    place = np.arange(-half - 1, half + 2) / (half + 1.0)
+    weight = np.maximum(1.0 - place**2, 0.0) ** TEST_FUNCTION_POWER
+    weight /= weight.sum()
+    curvature = np.convolve(weight, [1.0, -2.0, 1.0], "same") / step**2
+    return weight, curvature
