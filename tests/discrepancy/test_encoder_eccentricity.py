@@ -18,7 +18,7 @@ from impactcell.discrepancy.machine import (
     investigate_machine,
     simulate_held_out,
 )
-from impactcell.discrepancy.report import machine_result
+from impactcell.discrepancy.report import german_machine_sentences, machine_result, machine_sentences
 from impactcell.errors import SettingsError
 from impactcell.records import Capture, Channel
 from impactcell.settings.base_model import base_model_text, read_base_model
@@ -103,6 +103,11 @@ def test_a_law_of_the_machine_is_found_beside_what_the_encoder_may_be(tmp_path: 
         place = law.model.fit.columns.index((ECCENTRICITY, 0.0, number))
         assert law.model.fit.low[place] < truth < law.model.fit.high[place]
     assert any("law is of what is left beside it" in note for note in finding.notes)
+    said = f"which takes it to {law.fall.before:.2f}, s(q) with "
+    assert said in machine_sentences.headline(finding)
+    assert f"bringt sie auf {law.fall.before:.2f}".replace(".", ",") in german_machine_sentences.headline(
+        finding
+    )
     write_machine_findings(finding, campaign, tmp_path / "found", "campaign")
     again, _ = read_base_model(tmp_path / "found" / f"{law.place}.yaml")
     assert again.position_eccentricity == NumberPrior(0.0, math.inf)

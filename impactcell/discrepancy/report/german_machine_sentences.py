@@ -72,10 +72,13 @@ def headline(finding: MachineFinding) -> str:
         )
         if not finding.is_at_floor:
             said += " Etwas bleibt, das es nicht erklärt."
-    if finding.law is not None:
+    law = finding.law
+    if law is not None:
+        if law.model.base != finding.base:
+            said += f" Ein Drehgeber, der außermittig sitzt, bringt sie auf {law.fall.before:.2f}; neben ihm:"
         said += (
-            f" {equation(law_equation(finding.law))}, bringt die Abweichung auf "
-            f"{finding.law.fall.after:.2f}: ein Gesetz, das keine Liste hatte."
+            f" {equation(law_equation(law))}, bringt die Abweichung auf {law.fall.after:.2f}: "
+            "ein Gesetz, das keine Liste hatte."
         )
     fit = finding.simulated[-1].fit_percent
     follows = german_open_loop_sentence(channel_name(finding.base.response), fit)
