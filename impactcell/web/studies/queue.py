@@ -124,20 +124,22 @@ class StudyQueue:
         if len(names) == 1 and zips and await asyncio.to_thread(holds_campaign, files / names[0]):
             study.begin_step("unpacking")
             await asyncio.to_thread(unpack_campaign, files / names[0], campaign)
-            study.overview = {}
+            overview = {}
         else:
-            await self._import(study, [files / name for name in names])
-        study.overview |= await asyncio.to_thread(campaign_overview, campaign)
+            overview = await self._import(study, [files / name for name in names])
+        # In one go: the page is shown meanwhile, and asks for what belongs together.
+        study.overview = overview | await asyncio.to_thread(campaign_overview, campaign)
         study.stage = Stage.CONFIRMING
 
-    async def _import(self, study: Study, files: Sequence[Path]) -> None:
+    async def _import(self, study: Study, files: Sequence[Path]) -> dict[str, Any]:
         arguments = ["import", *map(str, files), "-o", str(self.store.campaign(study)), "--json"]
         outcome = await self._verb(study, [*arguments, *import_options(study.choices)], READ_S, may_fail=True)
-        study.overview = _json(outcome.output)
+        overview = _json(outcome.output)
         if not outcome.is_done:
             study.faults = _faults(study, self.store, outcome)
-            if not study.overview:
+            if not overview:
                 raise StudyFailedError("\n".join(study.faults))
+        return overview
 
     async def _study(self, study: Study) -> None:
         results = self.store.results(study)

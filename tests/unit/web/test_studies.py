@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import statistics
+import threading
 import zipfile
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -18,7 +19,7 @@ import pytest
 from impactcell.errors import CampaignError
 from impactcell.process.background import VerbOutcome
 from impactcell.scada import Role
-from impactcell.web.studies import campaign_archive, pages, upload
+from impactcell.web.studies import campaign_archive, pages, queue, upload
 from impactcell.web.studies.campaign_archive import unpack_campaign
 from impactcell.web.studies.pages import REPORT_POLICY
 from impactcell.web.studies.queue import MAX_WAITING
@@ -96,6 +97,32 @@ async def until(page: Page, study: str, *stages: Stage) -> Study:
             if found.stage in stages and not found.is_working:
                 return found
             await asyncio.sleep(0.005)
+
+
+async def test_what_was_read_is_shown_whole_or_not_at_all(
+    page: Page, verbs: Verbs, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page brings itself up to date while the campaign that `import` wrote is still being looked at."""
+    looking, go_on = threading.Event(), threading.Event()
+
+    def look(_: Path) -> dict[str, Any]:
+        looking.set()
+        go_on.wait(PATIENCE_S)
+        return {"shots": 2, "traces": 2, "channels": [], "covariates": [], "mass_kg": None,
+                "velocity_mm_per_min": None}  # fmt: skip
+
+    monkeypatch.setattr(queue, "campaign_overview", look)
+    verbs.outcomes["import"] = VerbOutcome(0, json.dumps({"shots": 2, "columns": [], "notes": []}), ())
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, _ = await drop(client, "log.csv", b"t;F\n0;1\n")
+        assert await asyncio.to_thread(looking.wait, PATIENCE_S)
+        meanwhile = await client.get(f"/studies/{study}/state")
+        go_on.set()
+        await until(page, study, Stage.CONFIRMING)
+        then = await client.get(f"/studies/{study}/state")
+    assert (meanwhile.status_code, then.status_code) == (200, 200)
+    assert "2 shots" not in meanwhile.text
+    assert "2 shots" in then.text
 
 
 async def test_a_campaign_is_dropped_confirmed_and_studied(page: Page, verbs: Verbs) -> None:
