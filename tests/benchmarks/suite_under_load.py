@@ -7,7 +7,8 @@ All that pytest said is kept in `--keep DIR`, a file for each run.
 
 With `--together` the runs go side by side and are each other's load (five of three workers each are a load of
 15; `--load 5` makes it 20). Each has a clone of the last commit of its own, so that runs do not meet in
-files, and the same installed packages.
+files, and the same installed packages; and a loopback of its own where that can be had (`unshare`, as root), so
+that they do not meet at a port either: each demo prefers the registered one.
 """
 
 import argparse
@@ -34,6 +35,8 @@ SUITE = ("-n", "auto", "--maxprocesses", "4", "--dist", "worksteal", "-v", "-o",
 hanging."""
 INSTALLED = ("tests/interop/node/node_modules", "tests/browser/node_modules")
 """Foreign programs that `.ci/run` installs beside the tests; without them those tests skip."""
+ALONE = ("unshare", "--net", "sh", "-c", 'ip link set lo up && exec "$@"', "sh")
+"""Begins a command with a loopback of its own."""
 LAST_LINES = re.compile(r"^(FAILED|ERROR) .*|^.*\b(?:passed|failed|error)\b.* in .*$", re.MULTILINE)
 
 
@@ -71,10 +74,16 @@ class Run:
         return [match[0] for match in LAST_LINES.finditer(self.output)]
 
 
-def run(arguments: list[str], log: Path, checkout: Path = ROOT) -> Run:
+def _alone() -> tuple[str, ...]:
+    """`ALONE`, where this machine and user can."""
+    able = shutil.which("unshare") and subprocess.run([*ALONE, "true"], capture_output=True, check=False)
+    return ALONE if able and able.returncode == 0 else ()
+
+
+def run(arguments: list[str], log: Path, checkout: Path = ROOT, before: tuple[str, ...] = ()) -> Run:
     """Run the suite once; what it says goes to a file."""
     began_s = time.monotonic()
-    command = [sys.executable, "-m", "pytest", *SUITE, *arguments]
+    command = [*before, sys.executable, "-m", "pytest", *SUITE, *arguments]
     # a summary line is cut at the terminal's width, and the reason with it
     environment = os.environ | {"PYTHONPATH": str(checkout), "COLUMNS": "400"}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)  # as `make test` does
@@ -97,7 +106,7 @@ def run_in_clone(arguments: list[str], log: Path) -> Run:
             if (ROOT / packages).is_dir():
                 (checkout / packages).symlink_to(ROOT / packages)
         _keep_compiled(checkout)
-        return run(arguments, log, checkout)
+        return run(arguments, log, checkout, _alone())
 
 
 def _keep_compiled(checkout: Path) -> None:

@@ -52,7 +52,9 @@ async def test_a_cell_runs_on_a_module_that_has_less(kind: str, tmp_path: Path) 
         scenario["sensors"] = LOGGER
         scenario["strikes"]["ahead"] = 1  # who reads late would find the next cycle in the only buffer
     async with simulator(tmp_path, **scenario) as told:
-        cell = write_cell(tmp_path, told["port"], module={"register_map": register_map})
+        # `probe` asks once: a busy machine answers later than a module does
+        module = {"register_map": register_map, "timeout_ms": 10_000}
+        cell = write_cell(tmp_path, told["port"], module=module)
         async with forked("impactcell", "run", str(cell)) as service:
             endpoint = (await service.line(r"cell=press-1 at (\S+)"))[1]
             async with asyncio.timeout(COMPILING_S):
