@@ -7,8 +7,8 @@ All that pytest said is kept in `--keep DIR`, a file for each run.
 
 With `--together` the runs go side by side and are each other's load (five of three workers each are a load of
 15; `--load 5` makes it 20). Each has a clone of the last commit of its own, so that runs do not meet in
-files, and the same installed packages; and a loopback of its own where that can be had (`unshare`, as root), so
-that they do not meet at a port either: each demo prefers the registered one.
+files, and the same installed packages; and a loopback of its own where that can be had (`unshare`, as root),
+so that they do not meet at a port either: each demo prefers the registered one.
 """
 
 import argparse
