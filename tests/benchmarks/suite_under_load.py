@@ -71,7 +71,7 @@ class Run:
     @property
     def last_lines(self) -> list[str]:
         """What failed, and how many of each there were."""
-        return [match[0] for match in LAST_LINES.finditer(self.output)]
+        return [match[0].strip("= ") for match in LAST_LINES.finditer(self.output)]
 
 
 def _alone() -> tuple[str, ...]:
