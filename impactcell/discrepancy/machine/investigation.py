@@ -62,9 +62,9 @@ def investigate_machine(
     fits = MachineFits(records, base, candidates, _held_records(records, train, test))
     _check_blocks(fits)
     finding = fits.investigate([*notes_of(data_faults), *notes], seed)
-    finding = with_experiments(fits, with_law(fits, finding))
     models = finding.nominal, finding.final
-    return replace(finding, simulated=tuple(simulate_held_out(finding, model) for model in models))
+    finding = replace(finding, simulated=tuple(simulate_held_out(finding, model) for model in models))
+    return with_experiments(fits, with_law(fits, finding))
 
 
 def _check_columns(base: BaseModel, records: Sequence[UniformRecord]) -> None:

@@ -114,8 +114,10 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | str:
     simulated = None
     if chosen is not None and fall.is_real:
         # What else is fitted beside the law may not make its simulation look near.
-        others = [model] if model.base is finding.base else [model, finding.final]
-        nearest = min((simulate_held_out(finding, one) for one in others), key=lambda error: error.rmse)
+        without = [simulate_held_out(finding, model)]
+        if model.base is not finding.base:
+            without.append(finding.simulated[-1])
+        nearest = min(without, key=lambda error: error.rmse)
         simulated = nearest, simulate_held_out(finding, law_model)
     law = MachineLaw(
         LAW_PREFIX + best.form, tested, curve, chosen, equivalents, rivals, model, law_model, fall, simulated

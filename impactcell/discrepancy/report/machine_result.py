@@ -28,7 +28,6 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
     """Outcome as `result.json` has it."""
     before, after = finding.simulated
     fall = finding.fall
-    level = math.sqrt(max(fall.after**2 - 1.0, 0.0))
     nominal = tuple(term for term in finding.final.terms if term.choice.name not in finding.established)
     return {
         "format": FORMAT,
@@ -38,23 +37,7 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
             _effect(finding, term) for term in finding.final.terms if term.choice.name in finding.established
         ],
         "unconfirmed": list(finding.unconfirmed),
-        "remaining": {
-            "explained": finding.is_at_floor,
-            "share": round_digits(
-                0.0 if finding.is_at_floor else (fall.after - 1.0) / max(fall.before - 1.0, 1e-9)
-            ),
-            "where": [] if finding.is_at_floor else [{"phase": _phase(finding), "depends_on": []}],
-            "model_error": {
-                "level": round_digits(level),
-                "unit": "1 = noise floor",
-                "correlation_s": round_digits(finding.remainder.correlation_s),
-            },
-            "shots": [] if finding.is_at_floor else list(finding.remainder.shots),
-            "share_in_shots": round_digits(0.0 if finding.is_at_floor else finding.remainder.share),
-            "share_of_constants": round_digits(
-                0.0 if finding.is_at_floor else finding.remainder.constant_share
-            ),
-        },
+        "remaining": _remaining(finding),
         "unexplained": None,
         "gap": {
             "unit": "1 = noise floor",
@@ -92,6 +75,33 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
         "seed": finding.seed,
         "model": "model.extended.yaml",
         "report": "report.html",
+    }
+
+
+def _remaining(finding: MachineFinding) -> dict[str, Any]:
+    """Say what remains; at the floor, only how large and how correlated that is."""
+    fall, left = finding.fall, finding.remainder
+    said = {
+        "explained": finding.is_at_floor,
+        "share": 0.0,
+        "where": [],
+        "model_error": {
+            "level": round_digits(math.sqrt(max(fall.after**2 - 1.0, 0.0))),
+            "unit": "1 = noise floor",
+            "correlation_s": round_digits(left.correlation_s),
+        },
+        "shots": [],
+        "share_in_shots": 0.0,
+        "share_of_constants": 0.0,
+    }
+    if finding.is_at_floor:
+        return said
+    return said | {
+        "share": round_digits((fall.after - 1.0) / max(fall.before - 1.0, 1e-9)),
+        "where": [{"phase": _phase(finding), "depends_on": []}],
+        "shots": list(left.shots),
+        "share_in_shots": round_digits(left.share),
+        "share_of_constants": round_digits(left.constant_share),
     }
 
 
