@@ -32,6 +32,10 @@ MULTIPLIER = 0.15  # Lagrange multiplier of the bound on overshoot, times that b
 SAME_MASS = 0.03  # relative difference of parts that share a table
 STALE = np.concatenate([[0.02, 0.04, 0.08, 0.03, 2.0], np.full(FEATURES, 0.03)])
 """Change of the posterior's mean or standard deviation, in its units, after which a table is made anew."""
+STALE_PLACE = 0.01
+"""Of a displacement or an indentation: by how much another place may differ before a table is made anew."""
+LEAST_OTHER_PLACE = 1e-3
+"""Less than that is the same place."""
 STEEPEST = 3.0
 """Slope of the displacement over the stroke that is followed from one place to another."""
 OUTLOOK_LASTS = 3.0
@@ -165,20 +169,26 @@ class LookaheadTable:
             and np.allclose(part[1:], self.part[1:], 0.02)
         )
 
-    def serves(self, knowledge: Knowledge) -> bool:
-        """Whether it need not be made anew for what is known now."""
-        return near(knowledge, self.knowledge, 1.0)
+    def serves(self, knowledge: Knowledge, place: Samples) -> bool:
+        """Whether it need not be made anew for what is known now, and for a part that lies there."""
+        return near(knowledge, self.knowledge, 1.0) and abs(self._other(place)) < STALE_PLACE
 
     def at(self, place: Samples) -> Samples:
         """`table` for a part that lies elsewhere: the discrepancy of the position moves with it."""
-        along, by_mass, direction = self.knowledge.mean[PARAMETERS + np.array([3, 4, 9])]
-        slope = (along + by_mass * MASS_KG / self.part[0]) * (place[0] - self.place[0]) / POSITION_M
-        slope += direction * (place[1] - self.place[1])
-        if abs(slope) < 1e-3:
+        other = self._other(place)
+        if abs(other) < LEAST_OTHER_PLACE:
             return self.table
-        factor, further = np.exp(self.sliding * slope), self.indenting * slope
-        moved: Samples = np.maximum(self.table * factor[:, :, None] + further[:, :, None], 0.0)
-        return moved
+        factor, further = np.exp(self.sliding * other), self.indenting * other
+        moved = np.maximum(self.table * factor[:, :, None] + further[:, :, None], 0.0)
+        # what moves nothing moves nothing there either: what is lifted off zero here would look like a way
+        there: Samples = np.where(self.table > 0.0, moved, self.table)
+        return there
+
+    def _other(self, place: Samples) -> float:
+        """Discrepancy of another place less that of the table's own, relative."""
+        along, by_mass, direction = self.knowledge.mean[PARAMETERS + np.array([3, 4, 9])]
+        way = (along + by_mass * MASS_KG / self.part[0]) * (place[0] - self.place[0]) / POSITION_M
+        return float(way + direction * (place[1] - self.place[1]))
 
 
 def stiffest(posterior: PlannerPosterior) -> Samples:

@@ -276,7 +276,7 @@ class TapPlanner:
         knowledge = knowledge_of(self._posterior)
         alike = (n for n, known in enumerate(self._lookaheads) if known.concerns(part))
         lookahead = self._lookaheads.pop(n) if (n := next(alike, None)) is not None else None
-        if lookahead is None or not lookahead.serves(knowledge):
+        if lookahead is None or not lookahead.serves(knowledge, place):
             lookahead = build_lookahead(self._limits, self._posterior, part, place, lookahead)
         self._lookaheads = [*self._lookaheads[1 - REMEMBERED :], lookahead]
         return lookahead

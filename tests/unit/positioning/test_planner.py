@@ -1,6 +1,7 @@
 """The planner in closed loop with the simulator's plant, and what it refuses."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,8 +9,11 @@ import pytest
 from impactcell.errors import PositioningError
 from impactcell.physics import Plant
 from impactcell.positioning import Tap, TapPlanner, Unreachable
+from impactcell.positioning.planner_posterior import PARAMETERS
 from simulator.plant_nominal import nominal_taps
 
+ALONG = 3
+"""Weight of the discrepancy of the position."""
 NOMINAL = Plant(stiffness_n_per_m=6.5e5, damping_n_s_per_m=465.0, mu_s=0.2, mu_k=0.152)
 
 
@@ -255,3 +259,20 @@ def test_learning_survives_being_stored() -> None:
     assert again.next_tap(7e-3, 9.0, 1e-3) == planner.next_tap(7e-3, 9.0, 1e-3)
     assert again.posterior.watch.evidence == planner.posterior.watch.evidence
     assert again.predictions == planner.predictions
+
+
+@pytest.mark.parametrize("along", [-0.1, 0.1])
+def test_hardly_outside_the_tolerance_a_tap_moves_the_part_wherever_it_lies(along: float) -> None:
+    """A table carried on from another place had taps in it that bring the part in and move nothing."""
+    planner = TapPlanner(tolerance_m=10e-6, plant=NOMINAL)
+    deliver(planner, NOMINAL, 29.3, 5e-3, np.random.default_rng(2))
+    learned = planner.posterior
+    means = learned.means.copy()
+    means[:, PARAMETERS + ALONG] += along
+    planner.resume(replace(learned, means=means))
+    assert isinstance(planner.next_tap(3e-3, 29.3), Tap)  # a table for parts that lie at 0
+    for position_m in (0.0, 0.01, 0.02, 0.03):
+        tap = planner.next_tap(10.018e-6, 29.3, position_m)
+        assert isinstance(tap, Tap)
+        assert tap.expected_m > 1e-6, (position_m, tap)
+        assert tap.expected_taps < 12.0
