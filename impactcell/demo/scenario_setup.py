@@ -88,8 +88,12 @@ def set_up_scenario(scenario: str, cycles: int | None) -> Iterator[DemoSetup]:
         password = secrets.token_urlsafe(9)
         write_users(directory / "users.yaml", {USER: with_password(User(USER, Role.ENGINEER), password)})
         warm_up(cell_design(read_cell(CONFIG / "cells" / f"{scenario}.yaml")))
-        with _simulator(played) as port:
-            cell = read_cell(_write_cell_file(scenario, directory, port))
+        with (
+            _simulator(played) as module_port,
+            customary_port(PREFERRED_PORT) as opcua_port,
+            customary_port(PREFERRED_PAGE_PORT) as page_port,
+        ):
+            cell = read_cell(_write_cell_file(scenario, directory, module_port, opcua_port, page_port))
             yield DemoSetup(cell, story(content), password, last_target_m(content), tour(content))
     finally:
         shutil.rmtree(directory, ignore_errors=True)
@@ -171,25 +175,35 @@ def _simulator(scenario: Path) -> Iterator[int]:
         errors.close()
 
 
-def _write_cell_file(scenario: str, directory: Path, port: int) -> Path:
-    """Write the scenario's cell file anew: for this module, with all that it writes in `directory`."""
+def _write_cell_file(
+    scenario: str, directory: Path, module_port: int, opcua_port: int, page_port: int
+) -> Path:
+    """Write the scenario's cell file anew: for these ports, with all that it writes in `directory`."""
     source = CONFIG / "cells" / f"{scenario}.yaml"
     content = yaml.safe_load(source.read_text(encoding="utf-8"))
     model = directory / "model.yaml"
     shutil.copy(source.parent / content["model"], model)
     content["model"] = str(model)
-    content["module"]["port"] = port
+    content["module"]["port"] = module_port
     content["module"]["register_map"] = str((source.parent / content["module"]["register_map"]).resolve())
-    content["opcua"]["endpoint"] = f"opc.tcp://127.0.0.1:{_free_port(PREFERRED_PORT)}/impactcell"
-    content["web"] = {"endpoint": f"http://127.0.0.1:{_free_port(PREFERRED_PAGE_PORT)}"}
+    content["opcua"]["endpoint"] = f"opc.tcp://127.0.0.1:{opcua_port}/impactcell"
+    content["web"] = {"endpoint": f"http://127.0.0.1:{page_port}"}
     path = directory / "cell.yaml"
     path.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
     return path
 
 
-def _free_port(preferred: int) -> int:
-    """Take a customary port; any free one where it is taken."""
-    for port in (preferred, 0):
-        with contextlib.suppress(OSError), socket.create_server(("127.0.0.1", port)) as free:
-            return int(free.getsockname()[1])
-    raise ImpactCellError("no free port on loopback")
+@contextlib.contextmanager
+def customary_port(preferred: int) -> Iterator[int]:
+    """Have a customary port while the demo runs; 0, any free one, where it is taken.
+
+    The datagram port of the same number is held meanwhile, so that of demos that start at once one has it.
+    """
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as mark:
+        port = preferred
+        try:
+            mark.bind(("127.0.0.1", preferred))
+            socket.create_server(("127.0.0.1", preferred)).close()
+        except OSError:
+            port = 0
+        yield port

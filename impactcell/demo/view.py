@@ -135,7 +135,7 @@ def _limit(snapshot: Snapshot) -> str:
         return f"{wear.limit:.3f}"
     if math.isinf(wear.cycles_to_limit):
         return f"{wear.limit:.3f}, not in sight"
-    if wear.cycles_to_limit <= 0.0:
+    if wear.cycles_to_limit < 0.5:
         return f"{wear.limit:.3f}, passed"
     between = f"{_count(wear.cycles_to_limit_low)} to {_count(wear.cycles_to_limit_high)}"
     return f"{wear.limit:.3f} in {wear.cycles_to_limit:.0f} ({between}) cycles"

@@ -1,8 +1,10 @@
 """The demo tells what its scenario does, and what the cell has to find out by itself."""
 
+import socket
+
 import pytest
 
-from impactcell.demo.scenario_setup import fit_events, story
+from impactcell.demo.scenario_setup import customary_port, fit_events, story
 
 
 def test_a_batch_that_the_plc_keeps_to_itself_is_told_as_such() -> None:
@@ -22,3 +24,16 @@ def test_a_batch_that_the_plc_keeps_to_itself_is_told_as_such() -> None:
 def test_batches_stay_in_their_order_however_short_the_demo_is(cycles: int | None, begins: list[int]) -> None:
     content = {"batches": [{"from_cycle": cycle, "id": str(cycle)} for cycle in (1, 40, 90)]}
     assert [batch["from_cycle"] for batch in fit_events(content, cycles)["batches"]] == begins
+
+
+def test_of_demos_that_start_at_once_one_has_the_customary_port() -> None:
+    """Before, each found the port free, and the second to listen at it ended with a fault."""
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = int(free.getsockname()[1])
+        with customary_port(port) as where_it_is_taken:
+            assert where_it_is_taken == 0
+    with customary_port(port) as first, customary_port(port) as second:
+        assert (first, second) == (port, 0)
+        socket.create_server(("127.0.0.1", first)).close()
+    with customary_port(port) as later:
+        assert later == port
