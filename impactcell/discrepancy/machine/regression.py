@@ -125,7 +125,8 @@ def fit_blocks(
         prior_weight(blocks, columns, coefficients, priors)
     )
     matrix += RIDGE * np.diag(np.diag(matrix))
-    inverse = np.linalg.pinv(matrix, hermitian=True)
+    size = _sizes(matrix)
+    inverse = np.linalg.pinv(matrix / np.outer(size, size), hermitian=True) / np.outer(size, size)
     freedom = max(len(blocks) - len(columns), 1)
     spread = inverse @ (scores.T @ scores) @ inverse * len(blocks) / freedom
     half = student.ppf(0.975, freedom) * np.sqrt(np.maximum(np.diag(spread), 0.0))
@@ -171,7 +172,7 @@ def _solve(
             matrix = gram + np.diag(weight)
             matrix = matrix + RIDGE * np.diag(np.diag(matrix))
             beside = right[free] - matrix[np.ix_(free, np.flatnonzero(held))] @ coefficients[held]
-            coefficients[free] = np.linalg.lstsq(matrix[np.ix_(free, free)], beside, rcond=None)[0]
+            coefficients[free] = _solved(matrix[np.ix_(free, free)], beside)
             left = max(total[-1, -1] - 2.0 * coefficients @ right + coefficients @ gram @ coefficients, 0.0)
             weight = _weight(left / (PIECES_PER_BLOCK * len(chosen)), columns, priors)
         beyond = ~held & ((coefficients < lower) | (coefficients > upper))
@@ -180,6 +181,19 @@ def _solve(
         held |= beyond
         coefficients = np.where(held, np.clip(coefficients, lower, upper), coefficients)
     return coefficients, held
+
+
+def _solved(matrix: Samples, right: Samples) -> Samples:
+    """Solve normal equations whatever units their columns have: a cube of millimetres is 1e-9 m³."""
+    size = _sizes(matrix)
+    solved: Samples = np.linalg.lstsq(matrix / np.outer(size, size), right / size, rcond=None)[0] / size
+    return solved
+
+
+def _sizes(matrix: Samples) -> Samples:
+    """Size of each column of a regression, by the diagonal of its normal equations; 1 where it is empty."""
+    diagonal = np.diag(matrix)
+    return np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
 
 
 def _reach(column: Column, priors: Mapping[Column, NumberPrior]) -> float:
