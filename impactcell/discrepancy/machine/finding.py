@@ -15,6 +15,8 @@ MIN_TRAINING, MIN_HELD_OUT = 9, 5
 """Blocks to fit and blocks held out that any test needs, as in the workflow of shots [1]."""
 MAX_EXPECTED_GAP = 1.3
 """Gap beyond which no scatter between blocks excuses a model, as in the workflow of shots [1]."""
+LEAST_GAP = 0.5
+"""Gap below which the noise is less than half of what it was taken for [1]."""
 MAX_P, MIN_CLOSED = 0.1, 0.02
 """Held-out test of a term beside an interval above 0, as in the workflow of shots [1]."""
 
@@ -236,6 +238,19 @@ class MachineFinding:
         return self.fall.after <= self.expected[1] and self.train_gaps[1] <= MAX_EXPECTED_GAP
 
     @property
+    def is_below_noise(self) -> bool:
+        """Whether so little remains that the noise must be less than it was taken for."""
+        return self.fall.after < LEAST_GAP
+
+    @property
+    def noise_is_motion(self) -> bool:
+        """Whether that noise was read off neighbouring samples: what differs between them is motion."""
+        is_driven = any(record.force.any() for record in self.records)
+        channels = 2 if is_driven else 1
+        stated = all(all(record.noise_is_stated[:channels]) for record in self.records)
+        return self.is_below_noise and not stated
+
+    @property
     def tied_with(self) -> dict[str, tuple[str, ...]]:
         """Rivals of each established term that the data cannot tell from it."""
         accepted = (step for step in self.steps if step.accepted is not None)
@@ -252,4 +267,6 @@ class MachineFinding:
             return "untested"
         if self.established:
             return "tied" if any(self.tied_with.values()) else "named"
+        if self.noise_is_motion:
+            return "untested"
         return "no_gap" if self.is_at_floor else "unknown"

@@ -11,6 +11,7 @@ from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
 from impactcell.discrepancy.machine.experiment_design import with_experiments
 from impactcell.discrepancy.machine.finding import MachineFinding
+from impactcell.discrepancy.machine.fine_sampling import finely_sampled
 from impactcell.discrepancy.machine.law_search import with_law
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.simulation import simulate_held_out
@@ -58,6 +59,7 @@ def investigate_machine(
             "one of them has to change its `coordinate`"
         )
     base, notes = hold_what_cannot_be_seen(base, records)
+    records, notes = _with_samples_enough(records, notes)
     candidates = _candidates(base, records)
     fits = MachineFits(records, base, candidates, _held_records(records, train, test))
     _check_blocks(fits)
@@ -133,6 +135,20 @@ def hold_what_cannot_be_seen(
         )
         base = replace(base, inertia=NumberPrior(base.inertia.value))
     return base, notes
+
+
+def _with_samples_enough(
+    records: Sequence[UniformRecord], notes: list[str]
+) -> tuple[tuple[UniformRecord, ...], list[str]]:
+    """Make records finer that are sampled coarsely for their motion, and say so."""
+    finer, samples = finely_sampled(records)
+    if math.isinf(samples):
+        return finer, notes
+    note = (
+        f"There are {samples:.1f} samples in a period of the fastest motion: between them it was taken to go "
+        f"as sine waves below half the sampling rate do, {finer[0].finer} samples for one."
+    )
+    return finer, [*notes, note]
 
 
 def _candidates(base: BaseModel, records: Sequence[UniformRecord]) -> tuple[TermChoice, ...]:

@@ -64,6 +64,9 @@ class UniformRecord:
         Samples that were replaced.
     noise : tuple of float
         Standard deviation of position and force: as stated, else from third differences.
+    noise_is_stated : tuple of bool
+    finer : int
+        Samples made of one of the sensors'; noise is then what white noise of the same density has.
     """
 
     shot: int
@@ -75,11 +78,18 @@ class UniformRecord:
     covariates: Mapping[str, float]
     spikes: int
     noise: tuple[float, float]
+    noise_is_stated: tuple[bool, bool] = (False, False)
+    finer: int = 1
 
     @property
     def step_s(self) -> float:
         """Time from sample to sample."""
         return float(self.time_s[1] - self.time_s[0])
+
+    @property
+    def sensor_noise(self) -> tuple[float, float]:
+        """Standard deviation of position and force as the sensors sample them."""
+        return self.noise[0] / math.sqrt(self.finer), self.noise[1] / math.sqrt(self.finer)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -158,6 +168,7 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         covariates=covariates,
         spikes=sum(spikes for _, spikes in cleaned),
         noise=(noise[0], abs(gain) * noise[1] if len(noise) > 1 else 0.0),
+        noise_is_stated=(channels[0].noise_std is not None, channels[-1].noise_std is not None),
     )
 
 

@@ -42,7 +42,13 @@ _REFERENCES: Final = {
 def headline(finding: MachineFinding) -> str:
     """Say what is established and what remains."""
     before, after = finding.fall.before, finding.fall.after
-    if finding.verdict == "untested":
+    if finding.verdict == "untested" and not finding.missing_blocks:
+        said = (
+            f"Keine Aussage: das Grundmodell lässt {before:.2f} dessen übrig, was für Rauschen gehalten "
+            "wurde; das meiste davon ist also Bewegung von Wert zu Wert. noise_std_n und noise_std_m der "
+            "Sensoren angeben oder schneller abtasten."
+        )
+    elif finding.verdict == "untested":
         said = (
             f"Zu wenige Blöcke für eine Aussage: {len(finding.training)} angepasst, {len(finding.held_out)} "
             f"zurückgehalten, etwa {finding.missing_blocks} weitere sind nötig. An zurückgehaltenen ist die "

@@ -93,6 +93,9 @@ NOTES: Final[Patterns] = (
      r"Messwerte vor dem Kontakt (Stöße: \1) werden nicht angepasst."),
     (r"(\d+) of (\d+) samples stood far from their neighbours and were replaced\.",
      r"\1 von \2 Messwerten lagen weit von ihren Nachbarn und wurden ersetzt."),
+    (r"There are ([\d.]+) samples in a period of the fastest motion: .*, (\d+) samples for one\.",
+     (r"Auf eine Periode der schnellsten Bewegung kommen \1 Messwerte: Zwischen ihnen gilt sie als Summe von "
+      r"Sinuswellen unter der halben Abtastrate, \2 Werte für einen.")),
     (r"Nothing drives: (\w+) cannot be seen and is held at its stated value\.",
      r"Nichts treibt an: \1 ist nicht zu sehen und bleibt bei dem angegebenen Wert."),
     (r"A free motion shows accelerations only: .*",

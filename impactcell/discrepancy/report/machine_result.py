@@ -62,7 +62,8 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
         },
         "noise_floor": {
             "noise_std": [
-                round_digits(max(record.noise[channel] for record in finding.records)) for channel in (1, 0)
+                round_digits(max(record.sensor_noise[channel] for record in finding.records))
+                for channel in (1, 0)
             ],
             "channels": ["force", "position"],
         },

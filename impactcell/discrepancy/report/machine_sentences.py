@@ -40,6 +40,12 @@ def law_equation(law: MachineLaw) -> str:
 
 def _conclusion(finding: MachineFinding) -> str:
     before, after = finding.fall.before, finding.fall.after
+    if finding.verdict == "untested" and not finding.missing_blocks:
+        return (
+            f"Nothing can be said: the base model leaves {before:.2f} of what was taken for noise, so that "
+            "most of it is motion from one sample to the next. State noise_std_n and noise_std_m of the "
+            "sensors, or sample faster."
+        )
     if finding.verdict == "untested":
         counts = f"{len(finding.training)} to fit and {len(finding.held_out)} held out"
         return (
