@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from impactcell.campaign import Campaign, Excitation
+from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import BaseModel, investigate_machine
 from impactcell.discrepancy.machine.fine_sampling import finely_sampled, highest_frequency
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
@@ -96,6 +96,10 @@ def test_motion_that_counts_as_noise_is_no_reason_to_say_that_nothing_is_missing
     assert finding.verdict == "untested"
     assert "State noise_std_n and noise_std_m" in machine_sentences.headline(finding)
     assert "noise_std_n und noise_std_m der Sensoren angeben" in german_machine_sentences.headline(finding)
+    turning = replace(finding, base=replace(base, coordinate=Coordinate.ROTATION))
+    assert "State noise_std_n_m and noise_std_rad" in machine_sentences.headline(turning)
+    free = replace(turning, records=tuple(replace(one, force=0.0 * one.force) for one in finding.records))
+    assert "State noise_std_rad of the sensors" in machine_sentences.headline(free)
     stated = tuple(
         replace(
             shot,

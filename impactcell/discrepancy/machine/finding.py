@@ -238,17 +238,16 @@ class MachineFinding:
         return self.fall.after <= self.expected[1] and self.train_gaps[1] <= MAX_EXPECTED_GAP
 
     @property
-    def is_below_noise(self) -> bool:
-        """Whether so little remains that the noise must be less than it was taken for."""
-        return self.fall.after < LEAST_GAP
+    def is_driven(self) -> bool:
+        """Whether a force acts."""
+        return any(record.force.any() for record in self.records)
 
     @property
     def noise_is_motion(self) -> bool:
-        """Whether that noise was read off neighbouring samples: what differs between them is motion."""
-        is_driven = any(record.force.any() for record in self.records)
-        channels = 2 if is_driven else 1
+        """Whether less than half remains of noise read off neighbouring samples: what differs there moves."""
+        channels = 2 if self.is_driven else 1
         stated = all(all(record.noise_is_stated[:channels]) for record in self.records)
-        return self.is_below_noise and not stated
+        return self.fall.after < LEAST_GAP and not stated
 
     @property
     def tied_with(self) -> dict[str, tuple[str, ...]]:

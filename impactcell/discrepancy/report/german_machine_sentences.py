@@ -7,7 +7,7 @@ from impactcell.discrepancy.report.german_notes import Patterns, note, reason
 from impactcell.discrepancy.report.german_sentences import equation, in_german, label, written
 from impactcell.discrepancy.report.german_words import phrase as channel_name
 from impactcell.discrepancy.report.german_words import term_name as phrase
-from impactcell.discrepancy.report.machine_sentences import law_equation
+from impactcell.discrepancy.report.machine_sentences import law_equation, noise_keys
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import german_open_loop_sentence
 
@@ -45,8 +45,8 @@ def headline(finding: MachineFinding) -> str:
     if finding.verdict == "untested" and not finding.missing_blocks:
         said = (
             f"Keine Aussage: das Grundmodell lässt {before:.2f} dessen übrig, was für Rauschen gehalten "
-            "wurde; das meiste davon ist also Bewegung von Wert zu Wert. noise_std_n und noise_std_m der "
-            "Sensoren angeben oder schneller abtasten."
+            "wurde; das meiste davon ist also Bewegung von Wert zu Wert. "
+            f"{enumerated(noise_keys(finding), 'und')} der Sensoren angeben oder schneller abtasten."
         )
     elif finding.verdict == "untested":
         said = (

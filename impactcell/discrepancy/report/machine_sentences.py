@@ -1,5 +1,6 @@
 """What the report of a machine says beside its template."""
 
+from impactcell.campaign import COLUMNS
 from impactcell.discrepancy.machine import FREE_FORMS, LAW_PLACES, MachineFinding, MachineLaw, term_of
 from impactcell.discrepancy.report.sentences import equation, label, note, reason, setting, written
 from impactcell.german.findings import enumerated
@@ -38,13 +39,19 @@ def law_equation(law: MachineLaw) -> str:
     return FREE_FORMS[LAW_PLACES[law.place]] if law.choice is None else term_of(law.choice).equation
 
 
+def noise_keys(finding: MachineFinding) -> list[str]:
+    """Keys of `campaign.yaml` that state the noise of the sensors there are."""
+    keys = COLUMNS[finding.base.coordinate]
+    return [keys[f"{channel}_noise"] for channel in ("force", "position")[not finding.is_driven :]]
+
+
 def _conclusion(finding: MachineFinding) -> str:
     before, after = finding.fall.before, finding.fall.after
     if finding.verdict == "untested" and not finding.missing_blocks:
         return (
             f"Nothing can be said: the base model leaves {before:.2f} of what was taken for noise, so that "
-            "most of it is motion from one sample to the next. State noise_std_n and noise_std_m of the "
-            "sensors, or sample faster."
+            "most of it is motion from one sample to the next. State "
+            f"{enumerated(noise_keys(finding), 'and')} of the sensors, or sample faster."
         )
     if finding.verdict == "untested":
         counts = f"{len(finding.training)} to fit and {len(finding.held_out)} held out"
