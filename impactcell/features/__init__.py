@@ -3,7 +3,7 @@
 from impactcell.features.channels import CheckedChannel, CheckedForce
 from impactcell.features.extraction import Fault, Features, extract, required
 from impactcell.features.measured import MeasuredFeature
-from impactcell.features.noise import noise_std, white_noise_std
+from impactcell.features.noise import drive_noise_std, is_command, noise_std, white_noise_std
 from impactcell.features.segment import SlideSegment
 from impactcell.features.slide import SlideFeatures
 
@@ -15,7 +15,9 @@ __all__ = [
     "MeasuredFeature",
     "SlideFeatures",
     "SlideSegment",
+    "drive_noise_std",
     "extract",
+    "is_command",
     "noise_std",
     "required",
     "white_noise_std",

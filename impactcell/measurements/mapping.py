@@ -29,6 +29,10 @@ PRIORITY = (
     ColumnMeaning.BATCH, ColumnMeaning.DWELL, ColumnMeaning.START,
 )  # fmt: skip
 """Order in which equally sure guesses are taken."""
+SPEED_OF = {Dimension.LENGTH: Dimension.VELOCITY, Dimension.ANGLE: Dimension.ANGULAR_VELOCITY}
+"""What a position changes by in time."""
+MEASURED_CHANGES = 0.1
+"""Share of samples that differ from the one before: what is set for a shot does not change within it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +125,10 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
             quantities[item.meaning] = chosen[taken.column] = unsure
         if taken is None and item.column not in chosen:
             chosen[item.column] = quantities[item.meaning] = item
-    assignments = tuple(chosen.get(name) or _further(column, given) for name, column in columns.items())
+    speed = SPEED_OF.get(_dimension_of(quantities.get(ColumnMeaning.POSITION)))
+    assignments = tuple(
+        chosen.get(name) or _further(column, given, speed) for name, column in columns.items()
+    )
     faults = [*lacking(assignments, given.constants, tables), *_without_use(assignments, given, tables)]
     faults += [*_unused_gains(assignments, given, columns), *_contrary_units(tables, given)]
     return Mapping(assignments, given, tuple(faults))
@@ -273,14 +280,28 @@ def _score_by_unit(unit: MeasuredUnit, columns: Sequence[MeasuredColumn], given:
     return 0.0, ""
 
 
-def _further(column: MeasuredColumn, given: Given) -> Assignment:
-    """Take a column that is none of the quantities for a covariate: it may still explain friction."""
+def _dimension_of(item: Assignment | None) -> Dimension:
+    return Dimension.NONE if item is None or item.unit is None else item.unit.dimension
+
+
+def _further(column: MeasuredColumn, given: Given, speed: Dimension | None) -> Assignment:
+    """Take a column that is none of the quantities for a covariate: it may still explain friction.
+
+    The mean of a `speed` that changes within a shot says nothing that the position does not.
+    """
     unit = _unit_of(column, given)
     if column.name in given.others:
         return Assignment(column.name, given.others[column.name], unit, GIVEN, "given")
     if column.text is None and len(column.values) > 2 and _counts(column.values):
         return Assignment(column.name, ColumnMeaning.IGNORED, unit, UNIT_MATCH + SURE, "counts the rows")
+    if unit is not None and unit.dimension is speed and _changing(column.values) > MEASURED_CHANGES:
+        return Assignment(column.name, ColumnMeaning.IGNORED, unit, SURE, "a speed, as the position has it")
     return Assignment(column.name, ColumnMeaning.COVARIATE, unit, SURE, "none of the known quantities")
+
+
+def _changing(values: Samples) -> float:
+    """Share of the samples that differ from the one before."""
+    return float(np.mean(np.diff(values[np.isfinite(values)]) != 0.0)) if len(values) > 1 else 0.0
 
 
 def _counts(values: Samples) -> bool:

@@ -9,6 +9,7 @@ import pytest
 
 from impactcell.discrepancy.laws import finding as shot_laws
 from impactcell.discrepancy.machine import CATALOGUE, FREE_FORMS, investigation, law_search, selection
+from impactcell.discrepancy.machine.machine_fits import _delay_note
 from impactcell.discrepancy.report import (
     german_machine_sentences,
     german_sentences,
@@ -102,11 +103,12 @@ def test_notes_on_a_machine_are_said_in_german() -> None:
     texts = sentences_of(investigation.hold_what_cannot_be_seen, 6)
     notes = [text for text in texts if text[0].isupper() or text[0].isdigit()]
     notes = [note for note in notes if not note.startswith("Hold numbers")]
-    assert len(notes) == 4
+    assert len(notes) == 5
     alike = "periodic force, covariate friction(oil): on these records like inertia, gravity or drive, and so"
     beside = "covariate_friction(oil) shows only beside quadratic_drag, which hides it on these records;"
     off = "Simulated open loop, held-out records are 0.2 N m off with it, 0.1 without."
     notes += [f"{alike} not looked for.", f"{beside} quadratic_drag is not named.", off, DRIFTS]
+    notes += _delay_note((-0.002, 0.4))
     for note in notes:
         assert german_sentences.note(note)[0] == "de", note
 

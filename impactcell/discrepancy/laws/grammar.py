@@ -9,6 +9,8 @@ import itertools
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from types import CodeType
 
 import numpy as np
 
@@ -90,8 +92,15 @@ def evaluate(source: str, u: Samples, parameters: Mapping[str, float]) -> Sample
     """
     places = {"u": u} if u.ndim < 2 else {"u": u[:, 0], "w": u[:, 1]}
     known = {**places, "math": _ArrayMath, "max": np.maximum, **parameters}
-    out = eval(source, {"__builtins__": {}}, known)  # noqa: S307  # made of this file's atoms and nothing else
-    return np.broadcast_to(np.asarray(out, dtype=np.float64), u.shape[:1])
+    out = eval(_compiled(source), {"__builtins__": {}}, known)  # noqa: S307  # this file's atoms, nothing else
+    values = np.asarray(out, dtype=np.float64)
+    return values if values.shape == u.shape[:1] else np.broadcast_to(values, u.shape[:1])
+
+
+@lru_cache(maxsize=1024)
+def _compiled(source: str) -> CodeType:
+    """Compile a function once: a simulation evaluates it at every step."""
+    return compile(source, "<law>", "eval")
 
 
 class _ArrayMath:

@@ -110,7 +110,7 @@ class OpenLoopError:
     rmse : float
         [m, rad, N or N m].
     fit_percent : float
-        100 (1 - rmse / standard deviation of what was measured).
+        100 (1 - rmse / standard deviation of what was measured), of a position about each stretch's own mean.
     relative_force : float
         rmse over the RMS of the measured force; nan where the position is predicted.
     """

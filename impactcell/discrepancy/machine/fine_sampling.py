@@ -56,10 +56,13 @@ def highest_frequency(values: Samples) -> tuple[float, float]:
 def finely_sampled(records: Sequence[UniformRecord]) -> tuple[tuple[UniformRecord, ...], float]:
     """Give records with samples enough for their motion, and how many there were in its shortest period.
 
-    Records come back as they are, with inf, where they are fine already or too short to tell.
+    Records come back as they are, with inf, where they are fine already or too short to tell, and where the
+    drive is switched: its motion goes from switch to switch as no sine wave does.
 
     Noise that two samples share in part counts as white noise of the same density: rows average over it.
     """
+    if any(record.force_is_command for record in records):
+        return tuple(records), math.inf
     long = [record for record in records if len(record.position) >= LONG]
     fastest = max((highest_frequency(record.position)[0] for record in long), default=0.0)
     if fastest <= 1.0 / COARSE:

@@ -11,7 +11,7 @@ from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.regression import PIECES_PER_BLOCK, Blocks, prior_weight
 from impactcell.discrepancy.machine.rival_forms import SPLINE_PIECES, splines
-from impactcell.discrepancy.machine.weak_form import Column, IndexArray
+from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.records import Samples
 
 SMOOTHNESS = (1e-4, 1e-2, 1.0, 1e2)
@@ -59,10 +59,11 @@ def best_spline(
     for weight in SMOOTHNESS:
         penalty = information * (weight * bends.T @ bends + RIDGE * np.eye(count))
         losses = np.empty(len(blocks))
-        for fold in np.unique(blocks.fold):
-            inside = blocks.fold == fold
-            fitted = _solve(fits, blocks, model, (spline_columns(form), penalty), np.flatnonzero(~inside))
-            losses[inside] = blocks.losses(*fitted)[inside]
+        for fold, outside in zip(np.unique(blocks.fold), blocks.without_folds, strict=True):
+            inside = np.flatnonzero(blocks.fold == fold)
+            sums = outside, len(blocks) - len(inside)
+            fitted = _solve(fits, blocks, model, (spline_columns(form), penalty), sums)
+            losses[inside] = blocks.losses(*fitted, inside)
         trials.append(FreeSpline(form, penalty, before - losses))
     return max(trials, key=lambda spline: float(spline.gains.sum()))
 
@@ -72,19 +73,22 @@ def _solve(
     blocks: Blocks,
     model: FittedModel,
     spline: tuple[Sequence[Column], Samples],
-    chosen: IndexArray,
+    sums: tuple[Samples, int],
 ) -> tuple[tuple[Column, ...], Samples]:
-    """Columns and coefficients of a model and a spline on some blocks; what is at its bound stays there."""
+    """Columns and coefficients of a model and a spline on some blocks; what is at its bound stays there.
+
+    `sums`: of these blocks' products, and how many they are.
+    """
     columns, penalty = spline
     fit = model.fit
     every = (*fit.columns, *columns)
     places = blocks.places(every)
-    total = blocks.products[chosen].sum(axis=0)
+    total, count = sums
     matrix = total[np.ix_(places, places)].copy()
     weight = prior_weight(blocks, fit.columns, fit.coefficients, fits.priors)
     own = len(fit.columns)
-    matrix[:own, :own] += np.diag(weight) * len(chosen) / len(blocks)
-    matrix[own:, own:] += penalty * len(chosen) / len(blocks)
+    matrix[:own, :own] += np.diag(weight) * count / len(blocks)
+    matrix[own:, own:] += penalty * count / len(blocks)
     coefficients = np.concatenate([np.where(fit.at_bound, fit.coefficients, 0.0), np.zeros(len(columns))])
     free = np.concatenate([np.logical_not(fit.at_bound), np.ones(len(columns), dtype=bool)])
     right = total[places, -1] - matrix @ coefficients
@@ -97,7 +101,7 @@ def _solve(
 def with_spline(fits: MachineFits, blocks: Blocks, model: FittedModel, spline: FreeSpline) -> FittedModel:
     """Model with a spline beside its terms, fitted to all blocks."""
     every, coefficients = _solve(
-        fits, blocks, model, (spline.columns, spline.penalty), np.arange(len(blocks))
+        fits, blocks, model, (spline.columns, spline.penalty), (blocks.products.sum(axis=0), len(blocks))
     )
     unknown = np.full(len(every), math.nan)
     at_bound = np.append(model.fit.at_bound, np.zeros(len(spline.columns), dtype=bool))

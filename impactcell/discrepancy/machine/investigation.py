@@ -114,6 +114,12 @@ def hold_what_cannot_be_seen(
     if spikes:
         samples = sum(2 * len(record.position) for record in records)
         notes.append(f"{spikes} of {samples} samples stood far from their neighbours and were replaced.")
+    commands = sum(record.force_is_command for record in records)
+    if commands:
+        notes.append(
+            f"The force is held from one update to the next in {commands} of {len(records)} records: it was "
+            "taken for a command without noise, which acts from its sample to the next."
+        )
     is_driven = any(np.ptp(record.force) > 0.0 for record in records)
     if not is_driven:
         notes += [

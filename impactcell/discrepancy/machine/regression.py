@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.stats import t as student
@@ -35,6 +35,8 @@ class Blocks:
         Sum of the rows' variances by the sensors' noise.
     fold : ndarray of int, shape (b,)
         Cross-validation leaves out one fold at a time.
+    without_folds : ndarray, shape (f, p + 1, p + 1)
+        Sums of products over all blocks but those of each fold, folds in their order.
     """
 
     names: tuple[Column, ...]
@@ -42,6 +44,12 @@ class Blocks:
     rows: Samples
     noise: Samples
     fold: IndexArray
+    without_folds: Samples = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Sum up, once for all models."""
+        without = [self.products[self.fold != one].sum(axis=0) for one in np.unique(self.fold)]
+        object.__setattr__(self, "without_folds", np.array(without).reshape(-1, *self.products.shape[1:]))
 
     def __len__(self) -> int:
         """Count the blocks."""
@@ -51,13 +59,14 @@ class Blocks:
         """Where columns stand in the matrices."""
         return [self.names.index(column) for column in columns]
 
-    def losses(self, columns: Sequence[Column], coefficients: Samples) -> Samples:
-        """Squared residual of every block, shape (b,)."""
+    def losses(
+        self, columns: Sequence[Column], coefficients: Samples, chosen: IndexArray | None = None
+    ) -> Samples:
+        """Squared residual of every block, or of those chosen, shape (b,)."""
         places = [*self.places(columns), len(self.names)]
+        products = self.products if chosen is None else self.products[chosen]
         vector = np.append(-coefficients, 1.0)
-        losses: Samples = np.einsum(
-            "i,bij,j->b", vector, self.products[np.ix_(range(len(self)), places, places)], vector
-        )
+        losses: Samples = products[:, places][:, :, places] @ vector @ vector
         return np.maximum(losses, 0.0)
 
 
@@ -115,15 +124,14 @@ def fit_blocks(
     nonnegative: frozenset[Column],
 ) -> LinearFit:
     """Fit a model to blocks, with 95 % intervals by the scatter between them (sandwich over blocks)."""
-    coefficients, at_bound = _solve(blocks, np.arange(len(blocks)), columns, priors, nonnegative)
+    whole = blocks.products.sum(axis=0)
+    coefficients, at_bound = _solve(blocks, (whole, len(blocks)), columns, priors, nonnegative)
     places = blocks.places(columns)
     last = len(blocks.names)
     scores = blocks.products[:, places, last] - np.einsum(
         "bij,j->bi", blocks.products[np.ix_(range(len(blocks)), places, places)], coefficients
     )
-    matrix = blocks.products.sum(axis=0)[np.ix_(places, places)] + np.diag(
-        prior_weight(blocks, columns, coefficients, priors)
-    )
+    matrix = whole[np.ix_(places, places)] + np.diag(prior_weight(blocks, columns, coefficients, priors))
     matrix += RIDGE * np.diag(np.diag(matrix))
     size = _sizes(matrix)
     inverse = np.linalg.pinv(matrix / np.outer(size, size), hermitian=True) / np.outer(size, size)
@@ -141,24 +149,27 @@ def out_of_fold_losses(
 ) -> Samples:
     """Squared residual of each block under coefficients fitted without its fold, shape (b,)."""
     losses = np.empty(len(blocks))
-    for fold in np.unique(blocks.fold):
-        outside = np.flatnonzero(blocks.fold != fold)
-        coefficients, _ = _solve(blocks, outside, columns, priors, nonnegative)
-        inside = blocks.fold == fold
-        losses[inside] = blocks.losses(columns, coefficients)[inside]
+    for fold, outside in zip(np.unique(blocks.fold), blocks.without_folds, strict=True):
+        inside = np.flatnonzero(blocks.fold == fold)
+        sums = outside, len(blocks) - len(inside)
+        coefficients, _ = _solve(blocks, sums, columns, priors, nonnegative)
+        losses[inside] = blocks.losses(columns, coefficients, inside)
     return losses
 
 
 def _solve(
     blocks: Blocks,
-    chosen: IndexArray,
+    sums: tuple[Samples, int],
     columns: Sequence[Column],
     priors: Mapping[Column, NumberPrior],
     nonnegative: frozenset[Column],
 ) -> tuple[Samples, Samples]:
-    """Coefficients on some blocks, and which of them stand at the end of what they may be."""
+    """Coefficients on some blocks, and which of them stand at the end of what they may be.
+
+    `sums`: of these blocks' products, and how many they are.
+    """
     places = blocks.places(columns)
-    total = blocks.products[chosen].sum(axis=0)
+    total, count = sums
     gram, right = total[np.ix_(places, places)], total[places, -1]
     lower = np.array([0.0 if column in nonnegative else -_reach(column, priors) for column in columns])
     upper = np.array([_reach(column, priors) for column in columns])
@@ -174,7 +185,7 @@ def _solve(
             beside = right[free] - matrix[np.ix_(free, np.flatnonzero(held))] @ coefficients[held]
             coefficients[free] = _solved(matrix[np.ix_(free, free)], beside)
             left = max(total[-1, -1] - 2.0 * coefficients @ right + coefficients @ gram @ coefficients, 0.0)
-            weight = _weight(left / (PIECES_PER_BLOCK * len(chosen)), columns, priors)
+            weight = _weight(left / (PIECES_PER_BLOCK * count), columns, priors)
         beyond = ~held & ((coefficients < lower) | (coefficients > upper))
         if not beyond.any():
             break

@@ -13,7 +13,7 @@ import numpy as np
 
 from impactcell.discrepancy.machine.base_model import NumberPrior, TermChoice
 from impactcell.discrepancy.machine.law_terms import term_of
-from impactcell.discrepancy.machine.regression import Blocks, out_of_fold_losses
+from impactcell.discrepancy.machine.regression import Blocks, fit_blocks, out_of_fold_losses
 from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS, PLACES
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.records import Samples
@@ -48,6 +48,8 @@ MACHINE: tuple[Column, ...] = tuple(
     (name, 0.0, 0) for name in ("inertia", "gravity_torque", "force_gain", "force_offset")
 )
 """Columns of the machine itself."""
+DELAY: Column = ("delay_s", 0.0, 0)
+"""Column of how late the force was recorded: the force's derivative."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -284,6 +286,20 @@ def mean_over_error(values: Samples) -> float:
 
 def _free_columns(form: str) -> list[Column]:
     return [(form, 0.0, number) for number in range(KNOTS)]
+
+
+def explained_by_delay(search: TermSearch, columns: Sequence[Column]) -> tuple[float, float] | None:
+    """How late the force would have been recorded [s], and the share of what remains that this explains.
+
+    None where it does not hold from block to block, or explains little.
+    """
+    before = search.losses(columns)
+    gains = before - search.losses([*columns, DELAY])
+    excess = float(before.sum() - search.blocks.noise.sum())
+    if not (mean_over_error(gains) >= MIN_GAIN_Z and gains.sum() >= MIN_SHARE * excess > 0.0):
+        return None
+    fit = fit_blocks(search.blocks, [*columns, DELAY], search.priors, search.nonnegative)
+    return float(fit.coefficients[-1]), min(float(gains.sum()) / excess, 1.0)
 
 
 def like_the_machine(blocks: Blocks, term: ChosenTerm) -> bool:

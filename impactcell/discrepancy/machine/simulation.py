@@ -56,11 +56,20 @@ def simulate_held_out(finding: MachineFinding, model: FittedModel) -> OpenLoopEr
         simulated = _positions(model, stretches, finding.scale.period_s)
         measured = [record.position[stretch] for record, stretch in stretches]
     counted = [np.isfinite(values) for values in simulated]
-    value = np.concatenate([values[mask] for values, mask in zip(measured, counted, strict=True)])
+    parts = [values[mask] for values, mask in zip(measured, counted, strict=True)]
+    value = np.concatenate(parts)
     error = np.concatenate([values[mask] for values, mask in zip(simulated, counted, strict=True)]) - value
     rmse = float(np.sqrt(np.mean(error**2)))
-    relative = rmse / float(np.sqrt(np.mean(value**2))) if model.base.response is Response.FORCE else math.nan
-    return OpenLoopError(rmse, 100.0 * (1.0 - rmse / float(value.std())), relative)
+    if model.base.response is Response.FORCE:
+        return OpenLoopError(rmse, _fit(rmse, value), rmse / float(np.sqrt(np.mean(value**2))))
+    # Where a stretch begins is given to the model: that the part lies elsewhere in the next is no motion.
+    return OpenLoopError(
+        rmse, _fit(rmse, np.concatenate([part - part.mean() for part in parts if part.size])), math.nan
+    )
+
+
+def _fit(rmse: float, varying: Samples) -> float:
+    return 100.0 * (1.0 - rmse / float(varying.std()))
 
 
 def needed_force(model: FittedModel, record: UniformRecord, stretch: slice, scale: MotionScale) -> Samples:

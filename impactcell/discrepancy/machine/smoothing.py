@@ -39,3 +39,8 @@ def test_function(half: int, step: float) -> tuple[Samples, Samples]:
     weight /= weight.sum()
     curvature = np.convolve(weight, [1.0, -2.0, 1.0], "same") / step**2
     return weight, curvature
+
+
+def test_slope(weight: Samples, step: float) -> Samples:
+    """Weights of the mean first derivative by central differences, of those of a mean."""
+    return np.convolve(weight, [-1.0, 0.0, 1.0], "same") / (2.0 * step)

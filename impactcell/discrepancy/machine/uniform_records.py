@@ -11,8 +11,8 @@ from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
 from impactcell.discrepancy.machine.smoothing import smoothed_acceleration
 from impactcell.errors import CampaignError
-from impactcell.features import white_noise_std
-from impactcell.records import Capture, Channel, Samples
+from impactcell.features import drive_noise_std, is_command, white_noise_std
+from impactcell.records import Capture, Samples
 
 MIN_HALF_SUPPORT = 5
 """Least half support of a test function [samples]: fewer do not average the noise of a sensor."""
@@ -65,6 +65,8 @@ class UniformRecord:
     noise : tuple of float
         Standard deviation of position and force: as stated, else from third differences.
     noise_is_stated : tuple of bool
+    force_is_command : bool
+        Held from its sample to the next, without noise.
     finer : int
         Samples made of one of the sensors'; noise is then what white noise of the same density has.
     """
@@ -79,6 +81,7 @@ class UniformRecord:
     spikes: int
     noise: tuple[float, float]
     noise_is_stated: tuple[bool, bool] = (False, False)
+    force_is_command: bool = False
     finer: int = 1
 
     @property
@@ -151,11 +154,21 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
             f"shot {shot.cycle}: {count} samples in common are too few; at least {8 * MIN_HALF_SUPPORT}"
         )
     time = begin + step * np.arange(count)
+    is_held = len(channels) > 1 and base.response is Response.POSITION and is_command(channels[1].values)
     cleaned = [_without_spikes(channel.values) for channel in channels]
     values = [
         np.interp(time, channel.time_s, clean) for channel, (clean, _) in zip(channels, cleaned, strict=True)
     ]
-    noise = [_noise(channel, clean) for channel, (clean, _) in zip(channels, cleaned, strict=True)]
+    if is_held:
+        # What is switched for a moment is no spike.
+        cleaned[1] = (channels[1].values, 0)
+        values[1] = _held(channels[1].time_s, channels[1].values, time)
+    noise = [
+        channel.noise_std if channel.noise_std is not None else estimate(clean)
+        for channel, (clean, _), estimate in zip(
+            channels, cleaned, (white_noise_std, drive_noise_std), strict=False
+        )
+    ]
     covariates = {name: value for name, value in shot.covariates.items() if isinstance(value, float)}
     gain = 1.0 + base.force_gain.value
     return UniformRecord(
@@ -169,11 +182,17 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         spikes=sum(spikes for _, spikes in cleaned),
         noise=(noise[0], abs(gain) * noise[1] if len(noise) > 1 else 0.0),
         noise_is_stated=(channels[0].noise_std is not None, channels[-1].noise_std is not None),
+        force_is_command=is_held,
     )
 
 
-def _noise(channel: Channel, values: Samples) -> float:
-    return channel.noise_std if channel.noise_std is not None else white_noise_std(values)
+def _held(times: Samples, values: Samples, at: Samples) -> Samples:
+    """Mean force from half a sample before to half a sample after, where each acts until the next one."""
+    impulse = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(times))])
+    half = 0.5 * (at[1] - at[0])
+    low, high = (np.clip(at + sign * half, times[0], times[-1]) for sign in (-1.0, 1.0))
+    mean: Samples = (np.interp(high, times, impulse) - np.interp(low, times, impulse)) / (high - low)
+    return mean
 
 
 def _without_spikes(values: Samples) -> tuple[Samples, int]:

@@ -14,7 +14,7 @@ from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.rival_forms import Basis, free_columns, hats
-from impactcell.discrepancy.machine.smoothing import smoothed_speed, test_function
+from impactcell.discrepancy.machine.smoothing import smoothed_speed, test_function, test_slope
 from impactcell.discrepancy.machine.terms import MotionState, Term
 from impactcell.discrepancy.machine.uniform_records import (
     MotionScale,
@@ -106,6 +106,7 @@ def _record_rows(
     step = record.step_s
     half, narrow = half_supports(record, scale)
     weight, curvature = test_function(half, step)
+    slope = test_slope(weight, step)
     velocity, speed_noise = smoothed_speed(record.position, narrow, step)
     force = record.force
     if delay_s:
@@ -147,6 +148,9 @@ def _record_rows(
     target = accelerating - _averaged(
         force - base.gravity_torque.value * np.sin(record.position), weight, centres
     )
+    # F(t + d) is linear in d about the delay of now, and counted from the one that is stated.
+    columns["delay_s", 0.0, 0] = _averaged(force, slope, centres)
+    target += (delay_s - base.delay_s.value) * columns["delay_s", 0.0, 0]
     sensors = (record.inertia * record.noise[0]) ** 2 * float(curvature @ curvature)
     sensors += record.noise[1] ** 2 * float(weight @ weight)
     return Rows(target, columns, np.zeros(target.size), record.time_s[centres], np.full(target.size, sensors))

@@ -93,6 +93,13 @@ NOTES: Final[Patterns] = (
      r"Messwerte vor dem Kontakt (Stöße: \1) werden nicht angepasst."),
     (r"(\d+) of (\d+) samples stood far from their neighbours and were replaced\.",
      r"\1 von \2 Messwerten lagen weit von ihren Nachbarn und wurden ersetzt."),
+    (r"The force is held from one update to the next in (\d+) of (\d+) records: .*",
+     (r"Die Kraft wird in \1 von \2 Messungen von einem Wert zum nächsten gehalten: Sie gilt als Vorgabe "
+      r"ohne Rauschen, die von ihrem Messwert bis zum nächsten wirkt.")),
+    (r"A force recorded (\S+) ms (late|early) would explain (\d+) % of what remains: .*",
+     lambda m: (f"Eine um {m[1]} ms zu {'spät' if m[2] == 'late' else 'früh'} aufgezeichnete Kraft erklärte "
+                f"{m[3]} % dessen, was bleibt: Mit delay_s unter den nuisances des Grundmodells wird die "
+                "Verzögerung mit allem anderen gefunden.")),
     (r"There are ([\d.]+) samples in a period of the fastest motion: .*, (\d+) samples for one\.",
      (r"Auf eine Periode der schnellsten Bewegung kommen \1 Messwerte: Zwischen ihnen gilt sie als Summe von "
       r"Sinuswellen unter der halben Abtastrate, \2 Werte für einen.")),

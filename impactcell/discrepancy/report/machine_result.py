@@ -227,18 +227,16 @@ def _nuisances(model: FittedModel) -> dict[str, Any]:
         "position_offset": (base.position_offset.value, 1.0),
         "inertia": (base.inertia.value, base.inertia.value),
         "gravity_torque": (base.gravity_torque.value, 1.0),
+        "delay_s": (base.delay_s.value, 1.0),
         ECCENTRICITY: (0.0, 1.0),
     }
-    document = {
+    return {
         ECCENTRIC_PARTS[column[2]] if column[0] == ECCENTRICITY else column[0]: _estimate(
             model, place, *fitted[column[0]]
         )
         for place, column in enumerate(model.fit.columns)
         if column[0] in fitted
     }
-    if not model.base.delay_s.is_held:
-        document["delay_s"] = {"value": round_digits(model.delay_s), "ci95": None, "at_bound": False}
-    return document
 
 
 def _estimate(model: FittedModel, place: int, stated: float = 0.0, unit: float = 1.0) -> dict[str, Any]:

@@ -35,6 +35,7 @@ GERMAN: Final = {
     r"named '(.+)'": r"heißt „\1“",
     r"the only column in (\S+)": r"einzige Spalte in \1",
     r"none of the known quantities": "keine der bekannten Größen",
+    r"a speed, as the position has it": "eine Geschwindigkeit, wie sie aus der Lage folgt",
 }  # fmt: skip
 """Notes and reasons as patterns; what is in none of them stays English."""
 WORDS: Final = {"mass": "Masse", "velocity": "Geschwindigkeit", "to": "bis"}

@@ -280,6 +280,24 @@ def test_a_mapping_file_says_the_same(files: list[Path], tmp_path: Path) -> None
         run_verb(["import", str(files[0]), "--mapping", str(mapping), "-o", str(tmp_path / "d")])
 
 
+def test_a_measured_speed_beside_the_position_is_no_covariate(tmp_path: Path) -> None:
+    """Without a name of its own; one that is set for a shot is kept."""
+    time = np.arange(0.0, 2.0, 0.01)
+    rows = [f"{t:.2f},{np.sin(t):.6f},{np.cos(t):.6f},0.25" for t in time]
+    (tmp_path / "swing.csv").write_text("\n".join(rows), encoding="utf-8")
+    given = Given(
+        columns={ColumnMeaning.TIME: "column 1", ColumnMeaning.POSITION: "column 2"},
+        units={"column 1": "s", "column 2": "rad", "column 3": "rad/s", "column 4": "rad/s"},
+        excitation=Excitation.FREE_SLIDE,
+    )
+    tables = read([tmp_path / "swing.csv"])
+    mapping = guess(tables, given)
+    assert [str(item.meaning) for item in mapping.assignments[2:]] == ["ignored", "covariate"]
+    assert mapping.assignments[2].why == "a speed, as the position has it"
+    assert page_note(mapping.assignments[2].why, "de")[0] == "de"
+    assert make_campaign(tables, mapping).campaign.shots[0].covariates == {"column_4_rad_per_s": 0.25}
+
+
 def test_columns_are_left_out_or_kept_as_covariates(tmp_path: Path) -> None:
     tables = [
         table(

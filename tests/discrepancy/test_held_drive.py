@@ -1,0 +1,148 @@
+"""Drives that are held from update to update: switched to and fro, at random levels, slower than the log."""
+
+import math
+import re
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from impactcell.campaign import Campaign, Excitation
+from impactcell.discrepancy.machine import BaseModel, NumberPrior, investigate_machine
+from impactcell.discrepancy.machine.uniform_records import uniform_records
+from impactcell.discrepancy.report.german_notes import note as german_note
+from impactcell.discrepancy.report.machine_result import machine_document
+from impactcell.features import drive_noise_std
+from impactcell.records import Capture, Channel
+
+RATE_HZ = 150.0
+MASS_KG, FRICTION_N, VISCOUS, DRIVE_N = 6.3, 2.0, 14.0, 13.0
+"""Of a cart that a motor pulls to and fro about a place, full force one way and then the other; SI."""
+CART = BaseModel(inertia=NumberPrior(6.0, math.inf), force_offset=NumberPrior(0.0, 3.0))
+
+
+@lru_cache
+def cart(late: int) -> tuple[Capture, ...]:
+    """Records of 8 s, integrated from switch to switch by another integrator than the workflow's.
+
+    The command is logged `late` samples before it acts.
+    """
+    shots = []
+    for number, place in enumerate((0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.65, 0.7, 0.72), 1):
+        rng = np.random.default_rng([11, number])
+        time = np.arange(0.0, 8.0, 1.0 / RATE_HZ)
+        command, position = np.empty(time.size), np.empty(time.size)
+        state, force = np.array([place - 0.004 * rng.random(), 0.0]), DRIVE_N
+        waiting = 0
+        for sample, now in enumerate(time):
+            position[sample], command[sample] = state[0], force
+            # To the middle, with some samples of delay, so that it swings a centimetre to either side.
+            wanted = -DRIVE_N if state[0] + 0.03 * state[1] > place else DRIVE_N
+            waiting = waiting + 1 if wanted != force else 0
+            acting = command[max(sample - late, 0)]
+
+            def rates(_: float, y: np.ndarray, acting: float = acting) -> tuple[float, float]:
+                return y[1], (acting - FRICTION_N * math.tanh(y[1] / 1e-3) - VISCOUS * y[1]) / MASS_KG
+
+            state = solve_ivp(rates, (now, now + 1.0 / RATE_HZ), state, rtol=1e-8, atol=1e-10).y[:, -1]
+            if waiting > 2 + int(rng.integers(3)):
+                force, waiting = wanted, 0
+        read = 4.4e-5 * np.round(position / 4.4e-5)
+        shots.append(
+            Capture(number, math.nan, math.nan, Channel(time, command, None), Channel(time, read, None))
+        )
+    return tuple(shots)
+
+
+def test_the_steps_of_a_switched_drive_are_no_noise_and_act_until_the_next() -> None:
+    finding = investigate_machine(Campaign(Excitation.DRIVEN, cart(0)), CART)
+    result = machine_document(finding)
+    assert result["noise_floor"]["noise_std"][0] == 0.0
+    assert (finding.verdict, finding.established) == ("named", ("viscous_friction",))
+    viscous = result["effects"][0]["parameters"]["viscous_coefficient_n_s_per_m"]["value"]
+    assert viscous == pytest.approx(VISCOUS, rel=0.1)
+    assert result["nominal"]["inertia"]["value"] == pytest.approx(MASS_KG, rel=0.01)
+    [note] = [note for note in finding.notes if "taken for a command" in note]
+    assert note.startswith("The force is held from one update to the next in 9 of 9 records")
+    language, german = german_note(note)
+    assert language == "de"
+    assert german.startswith(
+        "Die Kraft wird in 9 von 9 Messungen von einem Wert zum nächsten gehalten: Sie gilt"
+    )
+    assert not any("would explain" in note for note in finding.notes)
+    assert not any("were replaced" in note for note in finding.notes)
+
+
+def test_where_a_stretch_lies_is_no_motion_that_a_model_predicts() -> None:
+    """Places are half a metre apart, the motion about each is a centimetre."""
+    finding = investigate_machine(Campaign(Excitation.DRIVEN, cart(0)), CART)
+    error = finding.simulated[0]
+    held = [finding.records[place].position for place, _, _ in finding.held_spans]
+    varying = np.concatenate([position - position.mean() for position in held])
+    assert error.fit_percent == pytest.approx(100.0 * (1.0 - error.rmse / varying.std()), abs=1.0)
+    assert finding.simulated[-1].rmse < error.rmse
+
+
+def test_a_command_that_is_logged_early_is_asked_after_and_found_with_what_is_missing() -> None:
+    """By a sample, as by a motor's inductance: a negative delay, to a fiftieth of a sample."""
+    campaign = Campaign(Excitation.DRIVEN, cart(1))
+    unasked = investigate_machine(campaign, CART)
+    assert unasked.verdict == "unknown"
+    [note] = [note for note in unasked.notes if "would explain" in note]
+    assert re.match(r"A force recorded [5-8]\.\d ms early would explain 9\d % of what remains: delay_s", note)
+    assert re.match(r"Eine um [5-8],\d ms zu früh aufgezeichnete Kraft erklärte 9\d %", german_note(note)[1])
+    finding = investigate_machine(campaign, replace(CART, delay_s=NumberPrior(0.0, 0.02)))
+    assert finding.established == ("viscous_friction",)
+    delay = machine_document(finding)["nominal"]["delay_s"]
+    assert finding.final.delay_s == pytest.approx(-1.0 / RATE_HZ, abs=0.02 / RATE_HZ)
+    assert delay["ci95"][0] < delay["value"] < delay["ci95"][1]
+    assert not any("would explain" in note for note in finding.notes)
+
+
+def test_a_delay_goes_no_further_than_its_prior_allows() -> None:
+    campaign = Campaign(Excitation.DRIVEN, cart(1))
+    finding = investigate_machine(campaign, replace(CART, delay_s=NumberPrior(0.0, 0.001)))
+    assert finding.nominal.delay_s == pytest.approx(-0.002)
+    assert machine_document(finding)["nominal"]["delay_s"]["at_bound"]
+
+
+def test_a_slow_command_acts_until_the_next_one() -> None:
+    """A drive of another rate than the position: its impulse from sample to sample is what was given."""
+    times = np.cumsum(np.full(40, 0.05))
+    levels = np.repeat([5.0, -3.0, 5.0, 2.0], 10)
+    at = np.arange(times[0], times[-1], 0.004)
+    shot = Capture(1, math.nan, 1.0, Channel(times, levels, None), Channel(at, np.sin(at), None))
+    [record] = uniform_records(Campaign(Excitation.DRIVEN, (shot,)), BaseModel())
+    exact = levels[np.searchsorted(times, at - 1e-9, side="right") - 1]
+    assert record.force_is_command
+    assert np.abs(record.force[1:-1] - exact[1:-1]).max() <= 8.0
+    assert np.count_nonzero(np.abs(record.force - exact) > 1e-9) <= 8
+    assert record.force.sum() == pytest.approx(exact.sum(), abs=8.0)
+
+
+@pytest.mark.parametrize("held", [2, 5, 20])
+def test_noise_of_a_measured_drive_that_is_held(held: int) -> None:
+    rng = np.random.default_rng(1)
+    slow = 10.0 * np.sin(2.0 * math.pi * np.arange(1000) / 200.0) + rng.normal(0.0, 0.05, 1000)
+    assert drive_noise_std(np.repeat(slow, held)) == pytest.approx(0.05 * math.sqrt(held), rel=0.15)
+
+
+def test_levels_that_are_chosen_one_by_one_are_a_command() -> None:
+    rng = np.random.default_rng(2)
+    random_levels = np.repeat(rng.uniform(-5.0, 5.0, 300), rng.integers(5, 40, 300))
+    switched = np.repeat(rng.choice([-1.0, 0.0, 1.0], 200), rng.integers(4, 30, 200))
+    assert drive_noise_std(random_levels) == 0.0
+    assert drive_noise_std(switched) == 0.0
+
+
+@pytest.mark.parametrize("std", [0.02, 1.0])
+def test_noise_of_a_drive_that_is_not_held(std: float) -> None:
+    """Fine or on a coarse raster, which a slow signal crosses step by step."""
+    rng = np.random.default_rng(3)
+    slow = 10.0 * np.sin(2.0 * math.pi * np.arange(6000) / 3000.0)
+    noisy = slow + rng.normal(0.0, std, slow.size)
+    assert drive_noise_std(noisy) == pytest.approx(std, rel=0.1)
+    coarse = 0.5 * np.round(slow / 0.5)
+    assert drive_noise_std(coarse) >= 0.9 * 0.5 / math.sqrt(12.0)
