@@ -28,8 +28,11 @@ MIN_CONTACT_SAMPLES = 20
 """Samples of a contact by which its lateness can be told."""
 
 
-def slides(shot: Capture) -> DataFault | None:
-    """Say whether a recorded part moves beyond noise, and stays where it has moved to; None where it does."""
+def slides(shot: Capture, unit: str) -> DataFault | None:
+    """Say whether a recorded part moves beyond noise, and stays where it has moved to; None where it does.
+
+    `unit`: of the position, as it is told.
+    """
     position = shot.position
     if position is None or len(position.values) < MIN_CONTACT_SAMPLES or np.ptp(position.values) == 0.0:
         return None
@@ -41,7 +44,10 @@ def slides(shot: Capture) -> DataFault | None:
     excursion = float(np.ptp(smooth))
     if excursion < MOTION_STD * noise * math.sqrt(2.0 / 5.0) or excursion == 0.0:
         span = float(np.ptp(values))
-        told = f"the part does not move: its position stays within {span:.3g} m, noise is {noise:.2g} m"
+        told = (
+            f"the part does not move: its position stays within {span:.3g} {unit}, "
+            f"noise is {noise:.2g} {unit}"
+        )
         return DataFault(Fault.NO_MOTION, "position", told, shot.cycle)
     if shot.force is not None and math.isnan(shot.velocity_m_s):
         if _on_a_spring(shot.force, position):
@@ -54,7 +60,7 @@ def slides(shot: Capture) -> DataFault | None:
         return None
     if moved < max(spread, 0.02 * excursion):
         told = (
-            f"the part never slides: it moves by {excursion:.3g} m and springs back, so all is "
+            f"the part never slides: it moves by {excursion:.3g} {unit} and springs back, so all is "
             f"presliding; strike it harder"
         )
         return DataFault(Fault.PRESLIDING_ONLY, "position", told, shot.cycle)

@@ -20,7 +20,7 @@ from impactcell.german.findings import with_decimal_commas
 from impactcell.quality import DataFault, Fault, channel_faults, motion_faults, notes_of
 from impactcell.quality import campaigns as campaign_faults
 
-FILLED = {"name": "force", "which": "force", "other": "position", "word": "upper"}
+FILLED = {"name": "force", "unit": "rad", "which": "force", "other": "position", "word": "upper"}
 """What the sources put into their sentences where it is a word; elsewhere a number stands."""
 
 

@@ -86,3 +86,21 @@ def test_what_turns_is_asked_for_a_base_model() -> None:
     """Radians a second are no share of gravity: no unit is wrong where a base model is missing."""
     with pytest.raises(CampaignError, match=r"give a base model \(--base"):
         prepare(swings([3.0] * 6, 8.0))
+
+
+@pytest.mark.parametrize("gravity", [0.55, 0.0])
+def test_a_swing_that_ends_where_it_began_moves_and_a_part_that_springs_back_does_not(gravity: float) -> None:
+    """Where the base model has gravity; without it, coming back is presliding, told in the records' unit."""
+    time = np.arange(0.0, 24.0 * math.pi, 0.01)
+    rng = np.random.default_rng(7)
+    angle = 0.1 * np.exp(-0.002 * time) * np.cos(3.0 * time) + rng.normal(0.0, 1e-4, time.size)
+    shot = Capture(1, math.nan, math.nan, None, Channel(time, angle, 1e-4))
+    campaign = Campaign(Excitation.FREE_SLIDE, (shot,), coordinate=Coordinate.ROTATION)
+    base = BaseModel(
+        coordinate=Coordinate.ROTATION, inertia=NumberPrior(0.02), gravity_torque=NumberPrior(gravity)
+    )
+    if gravity:
+        assert not any("presliding" in note for note in investigate_machine(campaign, base).notes)
+        return
+    with pytest.raises(CampaignError, match=r"it moves by 0\.199 rad and springs back"):
+        investigate_machine(campaign, base)

@@ -63,9 +63,14 @@ def drifts(base: BaseModel) -> bool:
     Nothing pulls back then: what the zero of the force moves between two records, tenths of a per cent of it,
     carries the part away, and says nothing of any term.
     """
-    pulls = not (base.gravity_torque.is_held and base.gravity_torque.value == 0.0)
-    pulls = pulls or any(choice.identifier in PULLING_BACK or choice.law for choice in base.terms)
+    pulls = pulls_back(base) or any(choice.law for choice in base.terms)
     return base.response is Response.POSITION and not base.force_offset.is_held and not pulls
+
+
+def pulls_back(base: BaseModel) -> bool:
+    """Whether the base model has what brings a part back to a place: gravity, or a spring."""
+    has_gravity = not base.gravity_torque.is_held or base.gravity_torque.value != 0.0
+    return has_gravity or any(choice.identifier in PULLING_BACK for choice in base.terms)
 
 
 def constant_forces(

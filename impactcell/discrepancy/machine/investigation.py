@@ -12,13 +12,14 @@ from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Re
 from impactcell.discrepancy.machine.experiment_design import with_experiments
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.fine_sampling import finely_sampled
+from impactcell.discrepancy.machine.held_out_stretch import pulls_back
 from impactcell.discrepancy.machine.law_search import with_law
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
 from impactcell.errors import CampaignError
-from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
+from impactcell.quality import Fault, inspect_campaign, notes_of, refuse_unusable
 
 MANY_RECORDS = 8
 """Records from which on whole ones are held out; of fewer, the last third of each [1]."""
@@ -50,6 +51,8 @@ def investigate_machine(
         The records cannot be used with the base model; the message says why and what to do.
     """
     data_faults = inspect_campaign(campaign)
+    if pulls_back(base):  # what swings comes back to where it began, and follows a slow force
+        data_faults = tuple(one for one in data_faults if one.fault is not Fault.PRESLIDING_ONLY)
     refuse_unusable(campaign, data_faults)
     records = uniform_records(campaign, base)
     _check_columns(base, records)

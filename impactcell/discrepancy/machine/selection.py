@@ -75,12 +75,16 @@ class Trial:
     term : ChosenTerm
     gains : ndarray, shape (b,)
         Fall of each block's squared residual out of fold.
+    shares : ndarray, shape (b,)
+        The same over that residual, between -1 and 1: where a motion dies away its first blocks gain most,
+        and the later ones tell as surely.
     at_end : bool
         Its shape came to the end of its grid.
     """
 
     term: ChosenTerm
     gains: Samples
+    shares: Samples
     at_end: bool
 
     @property
@@ -90,8 +94,8 @@ class Trial:
 
     @property
     def z(self) -> float:
-        """Mean gain over its standard error."""
-        return mean_over_error(self.gains)
+        """Mean gain over its standard error, or mean share of a gain over its own, whichever is larger."""
+        return max(mean_over_error(self.gains), mean_over_error(self.shares))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -163,6 +167,11 @@ class TermSearch:
         """Gap of a model out of fold [1 = noise floor]."""
         return math.sqrt(float(self.losses(columns).sum()) / max(float(self.blocks.noise.sum()), 1e-300))
 
+    def shares(self, gains: Samples, before: Samples) -> Samples:
+        """Gains over what each block had left, no less than the sensors' noise; shape (b,)."""
+        left = np.maximum(np.maximum(before, self.blocks.noise), np.finfo(float).tiny)
+        return np.clip(gains / left, -1.0, 1.0)
+
     def best_shape(self, choice: TermChoice, columns: Sequence[Column], before: Samples) -> Trial:
         """Try a candidate at every value of its shape."""
         grid = self.shapes[choice.name]
@@ -170,7 +179,8 @@ class TermSearch:
         for shape in grid:
             term = ChosenTerm(choice, shape)
             gains = before - self.losses([*columns, *term.columns])
-            trials.append(Trial(term, gains, len(grid) > 1 and shape in (grid[0], grid[-1])))
+            at_end = len(grid) > 1 and shape in (grid[0], grid[-1])
+            trials.append(Trial(term, gains, self.shares(gains, before), at_end))
         return max(trials, key=lambda trial: trial.gain)
 
 
@@ -243,13 +253,13 @@ def _beside_another(
             mean_over_error(gains) >= MIN_GAIN_Z for gains in (pair.gains, own, pair.gains - best.gains)
         )
         if holds and not pair.at_end and pair.gain - max(float(alone.sum()), 0.0) >= least:
-            shown.append((pair, replace(best, gains=own)))
+            shown.append((pair, replace(best, gains=own, shares=search.shares(own, before))))
     if not shown:
         return None
     pair, own_trial = max(shown, key=lambda item: item[0].gain)
     for one, two in combinations(others, 2):
         together = before - search.losses([*columns, *one.term.columns, *two.term.columns])
-        if is_tied(pair, replace(pair, gains=together)):
+        if is_tied(pair, replace(pair, gains=together, shares=search.shares(together, before))):
             return None
     return own_trial, pair.term.choice.name
 
@@ -274,7 +284,8 @@ def is_tied(best: Trial, rival: Trial) -> bool:
     """Whether the blocks cannot tell a term that does worse from the best one."""
     if rival.gain < MIN_TIED_SHARE * best.gain or rival.at_end:
         return False
-    return rival.gain >= EQUAL_SHARE * best.gain or mean_over_error(best.gains - rival.gains) < TIE_Z
+    apart = mean_over_error(best.gains - rival.gains), mean_over_error(best.shares - rival.shares)
+    return rival.gain >= EQUAL_SHARE * best.gain or max(apart) < TIE_Z
 
 
 def mean_over_error(values: Samples) -> float:

@@ -41,13 +41,13 @@ DATA_FAULTS: Final[Patterns] = (
     (r"samples of the (\w+) are missing in (\d+) places, the first for (\S+) ms from (\S+) s: .*",
      lambda m: f"{phrase(m[1])}: Messwerte fehlen an {m[2]} Stellen, zuerst {m[3]} ms lang ab {m[4]} s: was "
      "dabei geschah, ist verloren"),
-    (r"the part does not move: its position stays within (\S+) m, noise is (\S+) m",
-     r"das Teil bewegt sich nicht: seine Position bleibt innerhalb von \1 m, das Rauschen ist \2 m"),
+    (r"the part does not move: its position stays within (\S+) (m|rad), noise is (\S+) (?:m|rad)",
+     r"das Teil bewegt sich nicht: seine Position bleibt innerhalb von \1 \2, das Rauschen ist \3 \2"),
     (r"its position follows the force as on a spring: .*",
      ("seine Position folgt der Kraft wie an einer Feder: es gleitet nie, oder eine Feder oder sein Gewicht "
       "überwiegt die Reibung bei weitem; stärker antreiben")),
-    (r"the part never slides: it moves by (\S+) m and springs back, .*",
-     r"das Teil gleitet nie: es bewegt sich um \1 m und federt zurück (Vorgleiten); stärker stoßen"),
+    (r"the part never slides: it moves by (\S+) (m|rad) and springs back, .*",
+     r"das Teil gleitet nie: es bewegt sich um \1 \2 und federt zurück (Vorgleiten); stärker stoßen"),
     (r"the (\w+) is recorded (\S+) ms after the (\w+) \((\d+) shots\): .*",
      lambda m: f"{phrase(m[1])} ist {m[2]} ms später aufgezeichnet als {phrase(m[3])} ({m[4]} Stöße): "
      "Filter und Uhr dieses Kanals prüfen, bevor ein Gesetz schuld ist"),

@@ -1,0 +1,58 @@
+"""A swing that dies away: nearly all of what a term explains is in the first blocks of one record."""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from impactcell.campaign import Campaign, Coordinate, Excitation
+from impactcell.discrepancy.machine import BaseModel, MachineFinding, NumberPrior, investigate_machine
+from impactcell.discrepancy.report.machine_result import machine_document
+from impactcell.records import Capture, Channel
+
+GRAVITY, COULOMB = 30.0, 0.1
+"""m g l and Coulomb friction over the inertia, 1/s²: at rest after a minute from 1.2 rad."""
+PENDULUM = BaseModel(
+    coordinate=Coordinate.ROTATION, inertia=NumberPrior(1.0), gravity_torque=NumberPrior(GRAVITY, math.inf)
+)
+
+
+@lru_cache
+def finding(drag: float, viscous: float) -> MachineFinding:
+    """What the base model of Coulomb friction lacks on one swing, by an integrator of its own."""
+
+    def rates(_: float, state: np.ndarray) -> tuple[float, float]:
+        q, v = state
+        against = COULOMB * math.tanh(v / 1e-3) + drag * v * abs(v) + viscous * v
+        return v, -GRAVITY * math.sin(q) - against
+
+    time = np.arange(0.0, 60.0, 0.005)
+    run = solve_ivp(rates, (0.0, 60.0), (1.2, 0.0), t_eval=time, rtol=1e-9, atol=1e-11, max_step=0.01)
+    angle = run.y[0] + np.random.default_rng(0).normal(0.0, 1e-4, time.size)
+    shot = Capture(1, math.nan, math.nan, None, Channel(time, angle, None))
+    campaign = Campaign(Excitation.FREE_SLIDE, (shot,), coordinate=Coordinate.ROTATION)
+    return investigate_machine(campaign, PENDULUM)
+
+
+@pytest.mark.parametrize(
+    ("drag", "viscous", "name", "parameter"),
+    [
+        (0.05, 0.0, "quadratic_drag", "drag_coefficient_n_m_s2_per_rad2"),
+        (0.0, 0.05, "viscous_friction", "viscous_coefficient_n_m_s_per_rad"),
+    ],
+)
+def test_what_slows_it_down_is_named(drag: float, viscous: float, name: str, parameter: str) -> None:
+    found = finding(drag, viscous)
+    assert (found.verdict, found.established) == ("named", (name,))
+    [effect] = machine_document(found)["effects"]
+    assert effect["tied_with"] == []
+    assert effect["parameters"][parameter]["value"] == pytest.approx(0.05, rel=0.03)
+    assert found.fall.before > 10.0
+    assert found.fall.after < 1.3
+    assert found.simulated[-1].rmse < 0.2 * found.simulated[0].rmse
+
+
+def test_nothing_is_named_where_nothing_is_missing() -> None:
+    assert finding(0.0, 0.0).verdict == "no_gap"
