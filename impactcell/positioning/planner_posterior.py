@@ -26,8 +26,8 @@ FRICTION, STIFFNESS, DAMPING, RATIO, VISCOUS = range(5)
 """Where each parameter lies in theta."""
 PARAMETERS = 5
 """Of theta; the weights of the discrepancy follow."""
-LEARNED_STD = np.concatenate([[0.015, 0.03, 0.05, 0.02, 3.0], LEARNED_WEIGHTS_STD])
-"""Left after a handful of taps."""
+LEARNED_STD = np.concatenate([[0.015, 0.03, 0.1, 0.02, 3.0], LEARNED_WEIGHTS_STD])
+"""Left after a handful of taps; of the damping little is learned, slow pushes say nothing of it."""
 SHARPENED = 6.0
 """Power of the scatter's probabilities that a handful of taps leaves: what is likely becomes likelier."""
 BATCH_STD = 0.08  # of friction, after a batch step whose size the tracker has not measured yet
