@@ -120,9 +120,10 @@ def _gaps(name: str, channel: Channel, shot: int) -> list[DataFault]:
     if not gaps.size:
         return []
     first = int(gaps[0])
+    places = "1 place" if gaps.size == 1 else f"{gaps.size} places"
     told = (
-        f"samples of the {name} are missing in {gaps.size} places, the first for {1e3 * steps[first]:.3g} "
-        f"ms from "
+        f"samples of the {name} are missing in {places}, "
+        f"the first for {1e3 * steps[first]:.3g} ms from "
         f"{channel.time_s[first]:.6g} s: what happened meanwhile is lost"
     )
     return [DataFault(Fault.DROPOUTS, name, told, shot)]

@@ -38,9 +38,9 @@ DATA_FAULTS: Final[Patterns] = (
     (r"the (\w+) is stuck at (\S+) for (\d+) samples from (\S+) s \((\d+) such stretches\): .*",
      lambda m: f"{phrase(m[1])} bleibt {m[3]} Messwerte lang auf {m[2]} stehen, ab {m[4]} s (so an {m[5]} "
      "Stellen): Messwerte gingen verloren"),
-    (r"samples of the (\w+) are missing in (\d+) places, the first for (\S+) ms from (\S+) s: .*",
-     lambda m: f"{phrase(m[1])}: Messwerte fehlen an {m[2]} Stellen, zuerst {m[3]} ms lang ab {m[4]} s: was "
-     "dabei geschah, ist verloren"),
+    (r"samples of the (\w+) are missing in (\d+)(?: places?)?, the first for (\S+) ms from (\S+) s: .*",
+     lambda m: f"{phrase(m[1])}: Messwerte fehlen an {m[2]} Stelle{'n' * (m[2] != '1')}, zuerst {m[3]} ms "
+     f"lang ab {m[4]} s: was dabei geschah, ist verloren"),
     (r"the part does not move: its position stays within (\S+) (m|rad), noise is (\S+) (?:m|rad)",
      r"das Teil bewegt sich nicht: seine Position bleibt innerhalb von \1 \2, das Rauschen ist \3 \2"),
     (r"its position follows the force as on a spring: .*",

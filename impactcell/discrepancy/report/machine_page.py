@@ -1,5 +1,6 @@
 """The page of an investigation with a base model, in the style of the report of shots."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
@@ -19,6 +20,8 @@ SHOWN_FORMS = 5
 """Forms alike that the page lists [1]."""
 SHOWN_TRIALS = 15
 """Terms that the page lists [1]."""
+PREFIXES = ("", "m", "µ", "n")
+"""Of units, each a thousandth of the one before."""
 MACHINE_SENTENCES: Mapping[str, ModuleType] = {"en": machine_sentences, "de": german_machine_sentences}
 """What is said beside the templates, by language: functions of the same names."""
 
@@ -45,6 +48,20 @@ def format_share(part: float, whole: float) -> str:
     return f"{round(100.0 * part / whole if whole else 0.0, 1) + 0.0:.1f} %"
 
 
+def with_prefix(simulation: Mapping[str, Any]) -> dict[str, Any]:
+    """Give errors of a simulation before and after to three digits, in a unit with the prefix that fits.
+
+    >>> with_prefix({"unit": "m", "rmse": {"before": 7.9017e-6, "after": 5.7941e-7}})
+    {'before': 7.9, 'after': 0.579, 'unit': 'µm'}
+    >>> with_prefix({"unit": "N", "rmse": {"before": 12.345, "after": 0.0}})
+    {'before': 12.3, 'after': 0.0, 'unit': 'N'}
+    """
+    largest = max(simulation["rmse"].values())
+    step = 0 if largest <= 0.0 else min(max(math.ceil(-math.log10(largest) / 3.0), 0), len(PREFIXES) - 1)
+    scaled = {name: float(f"{value * 1e3**step:.3g}") for name, value in simulation["rmse"].items()}
+    return {**scaled, "unit": PREFIXES[step] + simulation["unit"]}
+
+
 def machine_page_context(
     finding: MachineFinding, document: dict[str, Any], source: str, language: str
 ) -> dict[str, Any]:
@@ -59,6 +76,8 @@ def machine_page_context(
         "notes": [said.note(note) for note in document["notes"]],
         "law_refused": said.reason(finding.law_refused),
         "setting": said.setting,
+        "simulated": with_prefix(document["simulation"]),
+        "with_prefix": with_prefix,
         "equation": said.equation,
         "equations": {name: said.equation(term.equation) for name, term in CATALOGUE.items()},
         "references": {name: said.reference(term.reference) for name, term in CATALOGUE.items()},

@@ -112,7 +112,7 @@ def test_clean_data_are_clean(shots: tuple[Capture, ...]) -> None:
     [
         (spiked, 3, Fault.OUTLIERS, "shot 3: 2 outliers in the force, the first at 0.0401 s"),
         (clipped, 3, Fault.CLIPPING, "shot 3: the force stands at its upper end, 120, for"),
-        (gapped, 3, Fault.DROPOUTS, "missing in 1 places, the first for 5.1 ms from 0.03 s"),
+        (gapped, 3, Fault.DROPOUTS, "missing in 1 place, the first for 5.1 ms from 0.03 s"),
         (stuck, 3, Fault.DROPOUTS, "for 40 samples from 0.0041 s"),
         (constant, 3, Fault.CONSTANT, "shot 3: the force is constant at 2.5"),
         (drifting, None, Fault.DRIFT, "the force at rest goes from 1."),
