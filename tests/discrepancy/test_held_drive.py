@@ -108,6 +108,14 @@ def test_a_delay_goes_no_further_than_its_prior_allows() -> None:
     assert machine_document(finding)["nominal"]["delay_s"]["at_bound"]
 
 
+def test_nothing_remains_below_a_noise_that_is_stated_too_large() -> None:
+    loud = tuple(
+        replace(shot, force=replace(shot.force, noise_std=1e4)) for shot in cart(0)[:3] if shot.force
+    )
+    finding = investigate_machine(Campaign(Excitation.DRIVEN, loud), CART)
+    assert (finding.remainder.share, finding.remainder.constant_share) == (0.0, 0.0)
+
+
 def test_a_slow_command_acts_until_the_next_one() -> None:
     """A drive of another rate than the position: its impulse from sample to sample is what was given."""
     times = np.cumsum(np.full(40, 0.05))

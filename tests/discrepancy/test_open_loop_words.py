@@ -104,3 +104,14 @@ def test_a_swing_that_ends_where_it_began_moves_and_a_part_that_springs_back_doe
         return
     with pytest.raises(CampaignError, match=r"it moves by 0\.199 rad and springs back"):
         investigate_machine(campaign, base)
+
+
+def test_a_motion_within_the_noise_of_its_position_is_refused_with_the_way_out() -> None:
+    time = np.arange(0.0, 20.0, 0.005)
+    noisy = 0.1 * np.cos(3.0 * time) + np.random.default_rng(8).normal(0.0, 0.05, time.size)
+    shot = Capture(1, math.nan, math.nan, None, Channel(time, noisy, None))
+    campaign = Campaign(Excitation.FREE_SLIDE, (shot,), coordinate=Coordinate.ROTATION)
+    with pytest.raises(
+        CampaignError, match=r"nowhere does the part move faster .* record a larger or faster"
+    ):
+        investigate_machine(campaign, PENDULUM)

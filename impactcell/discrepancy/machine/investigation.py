@@ -97,6 +97,11 @@ def _check_blocks(fits: MachineFits) -> None:
     CampaignError
         There is not.
     """
+    if not fits.rows().target.size:
+        raise CampaignError(
+            "nowhere does the part move faster than the noise of its position shows: record a larger or "
+            "faster motion, or state noise_std_m (of a rotation noise_std_rad) in campaign.yaml if it is less"
+        )
     training, held_out, _ = fits.blocks()
     if not (len(training) and len(held_out)):
         thirds = fits.held is None

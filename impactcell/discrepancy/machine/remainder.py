@@ -26,7 +26,7 @@ def remainder_of(rows: Rows, model: FittedModel, records: Sequence[UniformRecord
     left = np.array(
         [max(float(np.sum(residual[rows_of] ** 2 - rows.variance[rows_of])), 0.0) for rows_of in inside]
     )
-    whole = max(float(left.sum()), np.finfo(float).tiny)
+    whole = float(left.sum())
     constants = sum(float(residual[rows_of].sum()) ** 2 / max(len(rows_of), 1) for rows_of in inside)
     worst = np.argsort(-left, kind="stable")
     count = int(np.searchsorted(np.cumsum(left[worst]), MOST * whole)) + 1
@@ -34,8 +34,8 @@ def remainder_of(rows: Rows, model: FittedModel, records: Sequence[UniformRecord
     return Remainder(
         _correlation_time(rows, residual, inside),
         tuple(records[place].shot for place in few),
-        float(left[few].sum()) / whole,
-        min(constants / whole, 1.0),
+        float(left[few].sum()) / whole if whole else 0.0,
+        min(constants, whole) / whole if whole else 0.0,
     )
 
 
