@@ -1,14 +1,19 @@
 """A swing that dies away: nearly all of what a term explains is in the first blocks of one record."""
 
+import json
 import math
+from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from impactcell.api.machine_findings import write_machine_findings
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import BaseModel, MachineFinding, NumberPrior, investigate_machine
+from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.records import Capture, Channel
 
@@ -20,8 +25,8 @@ PENDULUM = BaseModel(
 
 
 @lru_cache
-def finding(drag: float, viscous: float) -> MachineFinding:
-    """What the base model of Coulomb friction lacks on one swing, by an integrator of its own."""
+def swing(drag: float, viscous: float) -> Capture:
+    """One swing, by an integrator of its own."""
 
     def rates(_: float, state: np.ndarray) -> tuple[float, float]:
         q, v = state
@@ -31,8 +36,13 @@ def finding(drag: float, viscous: float) -> MachineFinding:
     time = np.arange(0.0, 60.0, 0.005)
     run = solve_ivp(rates, (0.0, 60.0), (1.2, 0.0), t_eval=time, rtol=1e-9, atol=1e-11, max_step=0.01)
     angle = run.y[0] + np.random.default_rng(0).normal(0.0, 1e-4, time.size)
-    shot = Capture(1, math.nan, math.nan, None, Channel(time, angle, None))
-    campaign = Campaign(Excitation.FREE_SLIDE, (shot,), coordinate=Coordinate.ROTATION)
+    return Capture(1, math.nan, math.nan, None, Channel(time, angle, None))
+
+
+@lru_cache
+def finding(drag: float, viscous: float) -> MachineFinding:
+    """What the base model of Coulomb friction lacks on it."""
+    campaign = Campaign(Excitation.FREE_SLIDE, (swing(drag, viscous),), coordinate=Coordinate.ROTATION)
     return investigate_machine(campaign, PENDULUM)
 
 
@@ -52,6 +62,22 @@ def test_what_slows_it_down_is_named(drag: float, viscous: float, name: str, par
     assert found.fall.before > 10.0
     assert found.fall.after < 1.3
     assert found.simulated[-1].rmse < 0.2 * found.simulated[0].rmse
+
+
+def test_a_model_that_runs_away_is_told_as_one(tmp_path: Path) -> None:
+    """A resistance that feeds the swing: no number overflows, and the report says how far off it is."""
+    found = finding(0.05, 0.0)
+    fit = found.final.fit
+    feeding = np.where([name == "quadratic_drag" for name, _, _ in fit.columns], -5.0, fit.coefficients)
+    model = replace(found.final, fit=replace(fit, coefficients=feeding))
+    error = simulate_held_out(found, model)
+    assert math.isfinite(error.rmse)
+    assert error.fit_percent < -1000.0
+    shown = replace(found, final=model, simulated=(found.simulated[0], error))
+    campaign = Campaign(Excitation.FREE_SLIDE, (swing(0.05, 0.0),), coordinate=Coordinate.ROTATION)
+    write_machine_findings(shown, campaign, tmp_path / "found", "a swing")
+    headline = json.loads((tmp_path / "found" / "result.json").read_text(encoding="utf-8"))["headline"]
+    assert "does not follow the held-out position: it errs" in headline
 
 
 def test_nothing_is_named_where_nothing_is_missing() -> None:

@@ -36,6 +36,9 @@ from impactcell.records import Samples
 
 STEPS_PER_PERIOD = 200
 """Least steps in a period of the motion: second order, a step errs by (2 pi / 200)² / 24 of its force [1]."""
+RUNAWAY = 100.0
+"""Times the largest distance from 0 that was measured, beyond which a simulated part goes no further: on a
+spring that softens it has run away, and by how much it errs is told all the same [1]."""
 
 
 def simulate_held_out(finding: MachineFinding, model: FittedModel) -> OpenLoopError:
@@ -182,6 +185,8 @@ def _runner(
     beyond, by_zero = _gravity_deviation(model)
     sine_torque = model.base.gravity_torque.value + beyond
     eccentricity = _eccentricity(model)
+    far = RUNAWAY * max(float(np.abs(record.position).max()) for record in records)
+    fast = far / float(step.max())
 
     def reading(angle: Samples) -> Samples:
         """Give what an encoder off its centre reads beside the angle."""
@@ -198,8 +203,8 @@ def _runner(
             smooth, friction = law(middle, 0.5 * (v + ahead), load)
             freely = v + step * (outside + smooth) / inertia
             held = step * np.maximum(friction, 0.0) / inertia
-            ahead = np.sign(freely) * np.maximum(np.abs(freely) - held, 0.0)
-        return middle + 0.5 * step * ahead, ahead
+            ahead = np.sign(freely) * np.clip(np.abs(freely) - held, 0.0, fast)
+        return np.clip(middle + 0.5 * step * ahead, -far, far), ahead
 
     def run(state: Samples, count: int, constant: Samples | float = 0.0) -> Samples:
         slope = eccentricity @ np.stack([-np.sin(state[0]), np.cos(state[0])])
