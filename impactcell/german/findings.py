@@ -115,7 +115,7 @@ def german_headline(result: Mapping[str, Any]) -> str:
     before, after = (with_decimal_commas(f"{gap[when]:.2f}") for when in ("before", "after"))
     match result["verdict"]:
         case "untested":
-            said = f"Zu wenige Messungen für eine Aussage; Abweichung des Modells: {before}."
+            said = f"Die Messungen reichen für keine Aussage; Abweichung des Modells: {before}."
         case "no_gap":
             said = f"Das Modell erklärt die Messungen: Abweichung {before}."
         case "unknown":

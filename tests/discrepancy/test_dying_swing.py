@@ -14,6 +14,7 @@ from impactcell.api.machine_findings import write_machine_findings
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import BaseModel, MachineFinding, NumberPrior, investigate_machine
 from impactcell.discrepancy.machine.simulation import simulate_held_out
+from impactcell.discrepancy.report import german_machine_sentences, machine_sentences
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.records import Capture, Channel
 
@@ -25,7 +26,7 @@ PENDULUM = BaseModel(
 
 
 @lru_cache
-def swing(drag: float, viscous: float) -> Capture:
+def swing(drag: float, viscous: float, rate_hz: float = 200.0, noise: float = 1e-4) -> Capture:
     """One swing, by an integrator of its own."""
 
     def rates(_: float, state: np.ndarray) -> tuple[float, float]:
@@ -33,9 +34,9 @@ def swing(drag: float, viscous: float) -> Capture:
         against = COULOMB * math.tanh(v / 1e-3) + drag * v * abs(v) + viscous * v
         return v, -GRAVITY * math.sin(q) - against
 
-    time = np.arange(0.0, 60.0, 0.005)
+    time = np.arange(0.0, 60.0, 1.0 / rate_hz)
     run = solve_ivp(rates, (0.0, 60.0), (1.2, 0.0), t_eval=time, rtol=1e-9, atol=1e-11, max_step=0.01)
-    angle = run.y[0] + np.random.default_rng(0).normal(0.0, 1e-4, time.size)
+    angle = run.y[0] + np.random.default_rng(0).normal(0.0, noise, time.size)
     return Capture(1, math.nan, math.nan, None, Channel(time, angle, None))
 
 
@@ -78,6 +79,20 @@ def test_a_model_that_runs_away_is_told_as_one(tmp_path: Path) -> None:
     write_machine_findings(shown, campaign, tmp_path / "found", "a swing")
     headline = json.loads((tmp_path / "found" / "result.json").read_text(encoding="utf-8"))["headline"]
     assert "does not follow the held-out position: it errs" in headline
+
+
+@pytest.mark.parametrize(("drag", "verdict"), [(0.05, "untested"), (0.0, "no_gap")])
+def test_what_noise_hides_in_the_equation_of_motion_the_simulation_shows(drag: float, verdict: str) -> None:
+    """A camera at 30 Hz that is off by 5 mrad: not that nothing is missing is said."""
+    campaign = Campaign(
+        Excitation.FREE_SLIDE, (swing(drag, 0.0, 30.0, 5e-3),), coordinate=Coordinate.ROTATION
+    )
+    found = investigate_machine(campaign, PENDULUM)
+    assert found.fall.after < 1.2
+    assert found.verdict == verdict
+    if drag:
+        assert "noise of the position hides what the simulation" in machine_sentences.headline(found)
+        assert "Das Rauschen der Position verdeckt" in german_machine_sentences.headline(found)
 
 
 def test_nothing_is_named_where_nothing_is_missing() -> None:

@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from impactcell.discrepancy.laws import FittedFunction
-from impactcell.discrepancy.machine.base_model import BaseModel, TermChoice
+from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
 from impactcell.discrepancy.machine.regression import Blocks, LinearFit
 from impactcell.discrepancy.machine.selection import ChosenTerm, SelectionStep
 from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.discrepancy.search import Proposal
+from impactcell.german.open_loop import POOR_FIT_PERCENT
 
 MIN_TRAINING, MIN_HELD_OUT = 9, 5
 """Blocks to fit and blocks held out that any test needs, as in the workflow of shots [1]."""
@@ -17,6 +18,8 @@ MAX_EXPECTED_GAP = 1.3
 """Gap beyond which no scatter between blocks excuses a model, as in the workflow of shots [1]."""
 LEAST_GAP = 0.5
 """Gap below which the noise is less than half of what it was taken for [1]."""
+FAR_ABOVE_NOISE = 2.0
+"""Error of a simulated position over the sensor's noise from which on it is no noise [1]."""
 MAX_P, MIN_CLOSED = 0.1, 0.02
 """Held-out test of a term beside an interval above 0, as in the workflow of shots [1]."""
 
@@ -250,6 +253,14 @@ class MachineFinding:
         return self.fall.after < LEAST_GAP and not stated
 
     @property
+    def noise_hides(self) -> bool:
+        """Whether the equation of motion shows nothing beyond noise, and a simulation errs far beyond."""
+        if not self.simulated or self.base.response is Response.FORCE or not self.is_at_floor:
+            return False
+        error, noise = self.simulated[-1], max(record.sensor_noise[0] for record in self.records)
+        return error.fit_percent < POOR_FIT_PERCENT and error.rmse > FAR_ABOVE_NOISE * noise
+
+    @property
     def tied_with(self) -> dict[str, tuple[str, ...]]:
         """Rivals of each established term that the data cannot tell from it."""
         accepted = (step for step in self.steps if step.accepted is not None)
@@ -266,6 +277,6 @@ class MachineFinding:
             return "untested"
         if self.established:
             return "tied" if any(self.tied_with.values()) else "named"
-        if self.noise_is_motion:
+        if self.noise_is_motion or self.noise_hides:
             return "untested"
         return "no_gap" if self.is_at_floor else "unknown"

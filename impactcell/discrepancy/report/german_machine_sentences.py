@@ -42,7 +42,13 @@ _REFERENCES: Final = {
 def headline(finding: MachineFinding) -> str:
     """Say what is established and what remains."""
     before, after = finding.fall.before, finding.fall.after
-    if finding.verdict == "untested" and not finding.missing_blocks:
+    if finding.verdict == "untested" and finding.noise_hides and not finding.missing_blocks:
+        said = (
+            "Keine Aussage: Das Rauschen der Position verdeckt in der Bewegungsgleichung (Abweichung "
+            f"{before:.2f} Rauschschwellen), was der Simulation zufolge fehlt. Mit weniger Rauschen "
+            "aufzeichnen, oder eine größere oder schnellere Bewegung."
+        )
+    elif finding.verdict == "untested" and not finding.missing_blocks:
         said = (
             f"Keine Aussage: das Grundmodell lässt {before:.2f} dessen übrig, was für Rauschen gehalten "
             "wurde; das meiste davon ist also Bewegung von Wert zu Wert. "

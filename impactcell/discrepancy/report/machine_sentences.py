@@ -47,6 +47,12 @@ def noise_keys(finding: MachineFinding) -> list[str]:
 
 def _conclusion(finding: MachineFinding) -> str:
     before, after = finding.fall.before, finding.fall.after
+    if finding.verdict == "untested" and finding.noise_hides and not finding.missing_blocks:
+        return (
+            f"Nothing can be said: in the equation of motion (gap {before:.2f} noise floors) noise of the "
+            "position hides what the simulation shows to be missing. Record with less noise, or a larger or "
+            "faster motion."
+        )
     if finding.verdict == "untested" and not finding.missing_blocks:
         return (
             f"Nothing can be said: the base model leaves {before:.2f} of what was taken for noise, so that "
