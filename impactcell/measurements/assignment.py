@@ -21,6 +21,8 @@ from impactcell.records import Samples
 
 SURE = 0.5
 """Confidence from which on a guess is used without being confirmed."""
+MEASURED_CHANGES = 0.1
+"""Share of a column's samples that differ from the one before, beyond which it was measured."""
 UNITLESS = (
     ColumnMeaning.SHOT,
     ColumnMeaning.DIRECTION,
@@ -151,3 +153,15 @@ def _no_time(tables: Sequence[Table]) -> str:
                 steps = np.diff(column.values)
                 return f": {column.name!r} goes forward in {np.sum(steps > 0.0)} of {steps.size} steps only"
     return ""
+
+
+def changes_within(values: Samples) -> bool:
+    """Whether a column changes as what is measured does; what is set for a shot stays for all of it."""
+    steps = np.diff(values[np.isfinite(values)])
+    return bool(len(steps)) and float(np.mean(steps != 0.0)) > MEASURED_CHANGES
+
+
+def counts_rows(values: Samples) -> bool:
+    """Whether a column goes by equal steps: it counts rows, or is one more time."""
+    steps = np.diff(values)
+    return bool(steps[0] != 0.0 and np.allclose(steps, steps[0], rtol=1e-6, atol=0.0))

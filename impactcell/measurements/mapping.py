@@ -4,11 +4,9 @@ from collections.abc import Mapping as AbstractMapping
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError
-from impactcell.measurements.assignment import SURE, Assignment, ascends, lacking
+from impactcell.measurements.assignment import SURE, Assignment, ascends, changes_within, counts_rows, lacking
 from impactcell.measurements.gains import Gain
 from impactcell.measurements.recognition import (
     UNIT_ALONE,
@@ -19,7 +17,6 @@ from impactcell.measurements.recognition import (
 )
 from impactcell.measurements.table import MeasuredColumn, Table
 from impactcell.measurements.units import Dimension, MeasuredUnit, parse_unit
-from impactcell.records import Samples
 
 GIVEN = 1.0
 """Confidence of what was given."""
@@ -31,8 +28,6 @@ PRIORITY = (
 """Order in which equally sure guesses are taken."""
 SPEED_OF = {Dimension.LENGTH: Dimension.VELOCITY, Dimension.ANGLE: Dimension.ANGULAR_VELOCITY}
 """What a position changes by in time."""
-MEASURED_CHANGES = 0.1
-"""Share of samples that differ from the one before: what is set for a shot does not change within it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,19 +287,8 @@ def _further(column: MeasuredColumn, given: Given, speed: Dimension | None) -> A
     unit = _unit_of(column, given)
     if column.name in given.others:
         return Assignment(column.name, given.others[column.name], unit, GIVEN, "given")
-    if column.text is None and len(column.values) > 2 and _counts(column.values):
+    if column.text is None and len(column.values) > 2 and counts_rows(column.values):
         return Assignment(column.name, ColumnMeaning.IGNORED, unit, UNIT_MATCH + SURE, "counts the rows")
-    if unit is not None and unit.dimension is speed and _changing(column.values) > MEASURED_CHANGES:
+    if unit is not None and unit.dimension is speed and changes_within(column.values):
         return Assignment(column.name, ColumnMeaning.IGNORED, unit, SURE, "a speed, as the position has it")
     return Assignment(column.name, ColumnMeaning.COVARIATE, unit, SURE, "none of the known quantities")
-
-
-def _changing(values: Samples) -> float:
-    """Share of the samples that differ from the one before."""
-    return float(np.mean(np.diff(values[np.isfinite(values)]) != 0.0)) if len(values) > 1 else 0.0
-
-
-def _counts(values: Samples) -> bool:
-    """Whether a column goes by equal steps: it counts rows, or is one more time."""
-    steps = np.diff(values)
-    return bool(steps[0] != 0.0 and np.allclose(steps, steps[0], rtol=1e-6, atol=0.0))

@@ -9,7 +9,7 @@ import pytest
 
 from impactcell.discrepancy.laws import finding as shot_laws
 from impactcell.discrepancy.machine import CATALOGUE, FREE_FORMS, investigation, law_search, selection
-from impactcell.discrepancy.machine.machine_fits import _delay_note
+from impactcell.discrepancy.machine.delay import delay_note
 from impactcell.discrepancy.report import (
     german_machine_sentences,
     german_sentences,
@@ -108,7 +108,7 @@ def test_notes_on_a_machine_are_said_in_german() -> None:
     beside = "covariate_friction(oil) shows only beside quadratic_drag, which hides it on these records;"
     off = "Simulated open loop, held-out records are 0.2 N m off with it, 0.1 without."
     notes += [f"{alike} not looked for.", f"{beside} quadratic_drag is not named.", off, DRIFTS]
-    notes += _delay_note((-0.002, 0.4))
+    notes += delay_note((-0.002, 0.4))
     for note in notes:
         assert german_sentences.note(note)[0] == "de", note
 

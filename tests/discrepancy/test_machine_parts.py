@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from impactcell.campaign import Coordinate
+from impactcell.discrepancy.machine import channel_values, proof, simulation
 from impactcell.discrepancy.machine import finding as machine_finding
-from impactcell.discrepancy.machine import proof, simulation, uniform_records
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
 from impactcell.discrepancy.machine.finding import Remainder
 from impactcell.discrepancy.machine.remainder import remainder_of
@@ -48,7 +48,7 @@ def test_spikes_are_taken_out_of_a_signal_far_from_nought() -> None:
     values = 100.0 + np.sin(np.linspace(0.0, 6.0, 600))
     spoilt = values.copy()
     spoilt[[150, 400]] += [30.0, -25.0]
-    clean, spikes = uniform_records._without_spikes(spoilt)
+    clean, spikes = channel_values.without_spikes(spoilt)
     assert spikes == 2
     assert clean == pytest.approx(values, abs=0.02)
 
@@ -57,7 +57,7 @@ def test_a_spike_is_replaced_by_the_line_between_its_neighbours() -> None:
     values = np.linspace(0.0, 5.99, 600)
     spoilt = values.copy()
     spoilt[[0, 150, 151, 400]] += [30.0, 30.0, 28.0, -25.0]
-    clean, spikes = uniform_records._without_spikes(spoilt)
+    clean, spikes = channel_values.without_spikes(spoilt)
     assert spikes == 4
     assert clean[1:] == pytest.approx(values[1:], abs=1e-12)
     assert clean[0] == values[1]
@@ -67,7 +67,7 @@ def test_a_push_of_some_samples_is_no_spike() -> None:
     values = np.random.default_rng(3).normal(0.0, 1.0, 6000)
     for place, height in enumerate((60.0, 55.0, 43.0, 23.0)):
         values[300 + place :: 500] += height
-    clean, spikes = uniform_records._without_spikes(values)
+    clean, spikes = channel_values.without_spikes(values)
     assert spikes == 0
     assert (clean == values).all()
 

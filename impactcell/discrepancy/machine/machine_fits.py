@@ -9,8 +9,10 @@ from typing import Self
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, TermChoice
+from impactcell.discrepancy.machine.delay import DELAY, delay_note, explained_by_delay
 from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
 from impactcell.discrepancy.machine.law_terms import term_of
+from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
 from impactcell.discrepancy.machine.regression import (
     BLOCKS_OF_RECORD,
@@ -23,12 +25,9 @@ from impactcell.discrepancy.machine.regression import (
 from impactcell.discrepancy.machine.remainder import remainder_of
 from impactcell.discrepancy.machine.rival_forms import Basis
 from impactcell.discrepancy.machine.selection import (
-    DELAY,
     ChosenTerm,
     SelectionStep,
     TermSearch,
-    explained_by_delay,
-    like_the_machine,
     select_terms,
 )
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, motion_scale
@@ -224,7 +223,7 @@ class MachineFits:
             candidates = [
                 choice for choice in self.candidates if not self._is_like_the_machine(training, choice)
             ]
-            notes = [*notes, *_alike(self.candidates, candidates)]
+            notes = [*notes, *alike_note(self.candidates, candidates)]
             search = TermSearch(training, candidates, self.shapes, self.priors, self.nonnegative)
             steps = select_terms(search, self.columns(base_terms))
             notes += [step.note for step in steps if step.note]
@@ -244,7 +243,7 @@ class MachineFits:
             final = self.fit(final.terms, settle=True)
             training, held_out = nominal_blocks
         if enough and self.base.delay_s.is_held:
-            notes = [*notes, *_delay_note(explained_by_delay(search, self.columns(final.terms)))]
+            notes = [*notes, *delay_note(explained_by_delay(search, self.columns(final.terms)))]
         established = tuple(falls)
         return MachineFinding(
             base=self.base,
@@ -299,24 +298,3 @@ class MachineFits:
                 begin = (held[0] % BLOCKS_OF_RECORD) * self.block_s if self.held is None else 0.0
                 spans.append((place, begin, float(record.time_s[-1])))
         return tuple(spans)
-
-
-def _delay_note(explained: tuple[float, float] | None) -> list[str]:
-    """Say what a delay that the base model does not have would explain."""
-    if explained is None:
-        return []
-    delay_s, share = explained
-    note = (
-        f"A force recorded {1e3 * abs(delay_s):.2g} ms {'late' if delay_s > 0.0 else 'early'} would explain "
-        f"{100.0 * share:.0f} % of what remains: delay_s among the nuisances of the base model finds the "
-        "delay with everything else."
-    )
-    return [note]
-
-
-def _alike(candidates: Sequence[TermChoice], kept: Sequence[TermChoice]) -> list[str]:
-    """Say which terms are not looked for."""
-    names = [choice.name.replace("_", " ") for choice in candidates if choice not in kept]
-    if not names:
-        return []
-    return [f"{', '.join(names)}: on these records like inertia, gravity or drive, and so not looked for."]

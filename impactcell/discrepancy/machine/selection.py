@@ -13,7 +13,7 @@ import numpy as np
 
 from impactcell.discrepancy.machine.base_model import NumberPrior, TermChoice
 from impactcell.discrepancy.machine.law_terms import term_of
-from impactcell.discrepancy.machine.regression import Blocks, fit_blocks, out_of_fold_losses
+from impactcell.discrepancy.machine.regression import Blocks, out_of_fold_losses
 from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS, PLACES
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.records import Samples
@@ -40,16 +40,8 @@ MAX_FLOOR = 1.3
 """Gap in noise floors up to which a model leaves nothing, as in the workflow of shots [1]."""
 MIN_SECOND_GAP = 2.0
 """Gap in noise floors beside the first term from which on a second one is named [1]."""
-MAX_ALIKE = 0.95
-"""Squared correlation with inertia, gravity or drive from which on a term cannot be told from it [1]."""
 NOT_IN_EVERY_BLOCK = "no term does better in block after block that it was not fitted to"
 """Why the best term is not taken where its gain scatters too much from block to block."""
-MACHINE: tuple[Column, ...] = tuple(
-    (name, 0.0, 0) for name in ("inertia", "gravity_torque", "force_gain", "force_offset")
-)
-"""Columns of the machine itself."""
-DELAY: Column = ("delay_s", 0.0, 0)
-"""Column of how late the force was recorded: the force's derivative."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,28 +289,3 @@ def mean_over_error(values: Samples) -> float:
 
 def _free_columns(form: str) -> list[Column]:
     return [(form, 0.0, number) for number in range(KNOTS)]
-
-
-def explained_by_delay(search: TermSearch, columns: Sequence[Column]) -> tuple[float, float] | None:
-    """How late the force would have been recorded [s], and the share of what remains that this explains.
-
-    None where it does not hold from block to block, or explains little.
-    """
-    before = search.losses(columns)
-    gains = before - search.losses([*columns, DELAY])
-    excess = float(before.sum() - search.blocks.noise.sum())
-    if not (mean_over_error(gains) >= MIN_GAIN_Z and gains.sum() >= MIN_SHARE * excess > 0.0):
-        return None
-    fit = fit_blocks(search.blocks, [*columns, DELAY], search.priors, search.nonnegative)
-    return float(fit.coefficients[-1]), min(float(gains.sum()) / excess, 1.0)
-
-
-def like_the_machine(blocks: Blocks, term: ChosenTerm) -> bool:
-    """Whether a term looks like inertia, gravity or drive: what is wrong with those would be named by it."""
-    own = blocks.places(MACHINE)
-    places = blocks.places(term.columns)
-    total = blocks.products.sum(axis=0)
-    tiny = np.finfo(float).tiny
-    size = np.outer(np.diag(total)[own], np.diag(total)[places]) + tiny
-    alike = total[np.ix_(own, places)] ** 2 / size
-    return bool(np.all(alike.max(axis=0) >= MAX_ALIKE))

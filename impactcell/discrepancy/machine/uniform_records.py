@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import binary_opening, median_filter
 
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
+from impactcell.discrepancy.machine.channel_values import LARGEST, held_mean, without_spikes
 from impactcell.discrepancy.machine.smoothing import smoothed_acceleration
 from impactcell.errors import CampaignError
 from impactcell.features import drive_noise_std, is_command, white_noise_std
@@ -20,16 +20,6 @@ PERIODS_PER_SUPPORT = 0.25
 """Support of a test function over the period of the motion: a half swing has four rows [1]."""
 SPEED_SUPPORT_SHARE = 0.25
 """Support by which a speed is smoothed, over that of a test function: direction turns fast [1]."""
-LARGEST = 0.995
-"""Share of the samples below what counts as the largest: one faulty sample does not set a range [1]."""
-SPIKE_WINDOW = 9
-"""Samples of the running median that a spike is held against."""
-SPIKE_FACTOR = 8.0
-"""A spike differs from the running median this many times more than 95 % of the samples do [1]."""
-MIN_SPIKE_SHARE = 0.05
-"""And by at least this share of the channel's range [1]."""
-MAX_SPIKE_SAMPLES = 2
-"""Samples in a row that are a spike, as where data are inspected: the pushes of a controller last longer."""
 MAX_HIDDEN_SHARE = 0.25
 """Share of the force's mean square that averaging over a test function may hide of the inertial force [1]."""
 SPANS_PER_PERIOD = 11.0
@@ -155,14 +145,14 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         )
     time = begin + step * np.arange(count)
     is_held = len(channels) > 1 and base.response is Response.POSITION and is_command(channels[1].values)
-    cleaned = [_without_spikes(channel.values) for channel in channels]
+    cleaned = [without_spikes(channel.values) for channel in channels]
     values = [
         np.interp(time, channel.time_s, clean) for channel, (clean, _) in zip(channels, cleaned, strict=True)
     ]
     if is_held:
         # What is switched for a moment is no spike.
         cleaned[1] = (channels[1].values, 0)
-        values[1] = _held(channels[1].time_s, channels[1].values, time)
+        values[1] = held_mean(channels[1].time_s, channels[1].values, time)
     noise = [
         channel.noise_std if channel.noise_std is not None else estimate(clean)
         for channel, (clean, _), estimate in zip(
@@ -184,28 +174,6 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         noise_is_stated=(channels[0].noise_std is not None, channels[-1].noise_std is not None),
         force_is_command=is_held,
     )
-
-
-def _held(times: Samples, values: Samples, at: Samples) -> Samples:
-    """Mean force from half a sample before to half a sample after, where each acts until the next one."""
-    impulse = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(times))])
-    half = 0.5 * (at[1] - at[0])
-    low, high = (np.clip(at + sign * half, times[0], times[-1]) for sign in (-1.0, 1.0))
-    mean: Samples = (np.interp(high, times, impulse) - np.interp(low, times, impulse)) / (high - low)
-    return mean
-
-
-def _without_spikes(values: Samples) -> tuple[Samples, int]:
-    """Replace one or two samples far from the running median by the line between their neighbours."""
-    middle = median_filter(values, SPIKE_WINDOW, mode="mirror")
-    distance = np.abs(values - middle)
-    usual = float(np.quantile(distance, 0.95))
-    span = float(np.subtract(*np.quantile(values, [LARGEST, 1.0 - LARGEST])))
-    far = distance > max(SPIKE_FACTOR * usual, MIN_SPIKE_SHARE * span, np.finfo(float).tiny)
-    # What stays away for longer is a motion or a push: a structure wider than a spike opens none of it.
-    spikes = far & ~binary_opening(far, np.ones(MAX_SPIKE_SAMPLES + 1, dtype=bool))
-    place = np.arange(len(values))
-    return np.interp(place, place[~spikes], values[~spikes]), int(spikes.sum())
 
 
 def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: float) -> MotionScale:

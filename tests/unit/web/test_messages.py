@@ -137,7 +137,7 @@ FOUND = {
           "outdone": {"effect": "friction_patch", "form": "-x' s", "same_place": False}},
          "-x' s, erklärt ebenso viel"),
         ({"verdict": "unknown", "outdone": None}, "Kein bekannter Effekt erklärt die Abweichung von 8,78."),
-        ({"verdict": "untested"}, "Zu wenige Messungen"),
+        ({"verdict": "untested"}, "reichen für keine Aussage"),
         ({"law": {"equation": "m x'' = s(v)"}}, "passt dazu: m x'' = s(v)."),
         ({"gap": {}}, "Missing: quadratic drag."),
     ],

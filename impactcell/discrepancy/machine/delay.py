@@ -1,0 +1,37 @@
+"""How late the force was recorded, where a base model does not say: what a delay would explain."""
+
+from collections.abc import Sequence
+
+from impactcell.discrepancy.machine.regression import fit_blocks
+from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, MIN_SHARE, TermSearch, mean_over_error
+from impactcell.discrepancy.machine.weak_form import Column
+
+DELAY: Column = ("delay_s", 0.0, 0)
+"""Column of how late the force was recorded: the force's derivative."""
+
+
+def explained_by_delay(search: TermSearch, columns: Sequence[Column]) -> tuple[float, float] | None:
+    """How late the force would have been recorded [s], and the share of what remains that this explains.
+
+    None where it does not hold from block to block, or explains little.
+    """
+    before = search.losses(columns)
+    gains = before - search.losses([*columns, DELAY])
+    excess = float(before.sum() - search.blocks.noise.sum())
+    if not (mean_over_error(gains) >= MIN_GAIN_Z and gains.sum() >= MIN_SHARE * excess > 0.0):
+        return None
+    fit = fit_blocks(search.blocks, [*columns, DELAY], search.priors, search.nonnegative)
+    return float(fit.coefficients[-1]), min(float(gains.sum()) / excess, 1.0)
+
+
+def delay_note(explained: tuple[float, float] | None) -> list[str]:
+    """Say what a delay that the base model does not have would explain."""
+    if explained is None:
+        return []
+    delay_s, share = explained
+    note = (
+        f"A force recorded {1e3 * abs(delay_s):.2g} ms {'late' if delay_s > 0.0 else 'early'} would explain "
+        f"{100.0 * share:.0f} % of what remains: delay_s among the nuisances of the base model finds the "
+        "delay with everything else."
+    )
+    return [note]

@@ -1,0 +1,36 @@
+"""Terms that look like inertia, gravity or drive on the records there are: they are not looked for."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from impactcell.discrepancy.machine.base_model import TermChoice
+from impactcell.discrepancy.machine.regression import Blocks
+from impactcell.discrepancy.machine.selection import ChosenTerm
+from impactcell.discrepancy.machine.weak_form import Column
+
+MACHINE: tuple[Column, ...] = tuple(
+    (name, 0.0, 0) for name in ("inertia", "gravity_torque", "force_gain", "force_offset")
+)
+"""Columns of the machine itself."""
+MAX_ALIKE = 0.95
+"""Squared correlation with inertia, gravity or drive from which on a term cannot be told from it [1]."""
+
+
+def like_the_machine(blocks: Blocks, term: ChosenTerm) -> bool:
+    """Whether a term looks like inertia, gravity or drive: what is wrong with those would be named by it."""
+    own = blocks.places(MACHINE)
+    places = blocks.places(term.columns)
+    total = blocks.products.sum(axis=0)
+    tiny = np.finfo(float).tiny
+    size = np.outer(np.diag(total)[own], np.diag(total)[places]) + tiny
+    alike = total[np.ix_(own, places)] ** 2 / size
+    return bool(np.all(alike.max(axis=0) >= MAX_ALIKE))
+
+
+def alike_note(candidates: Sequence[TermChoice], kept: Sequence[TermChoice]) -> list[str]:
+    """Say which terms are not looked for."""
+    names = [choice.name.replace("_", " ") for choice in candidates if choice not in kept]
+    if not names:
+        return []
+    return [f"{', '.join(names)}: on these records like inertia, gravity or drive, and so not looked for."]
