@@ -13,8 +13,8 @@ from impactcell.discrepancy.machine import BaseModel, NumberPrior, Response, Ter
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.held_out_stretch import constant_forces, drifts
 from impactcell.discrepancy.machine.regression import LinearFit
-from impactcell.discrepancy.machine.selection import ChosenTerm
 from impactcell.discrepancy.machine.simulation import simulate_held_out
+from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.records import Capture
 from tests.discrepancy import test_ramped_axis as ramped

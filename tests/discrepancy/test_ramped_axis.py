@@ -7,6 +7,7 @@ import pytest
 
 from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.machine import CATALOGUE, BaseModel, MachineFinding, NumberPrior, TermChoice
+from impactcell.discrepancy.machine.establishing import establish
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.uniform_records import motion_scale, uniform_records
 from impactcell.records import Capture, Channel
@@ -58,7 +59,7 @@ def found(campaign: Campaign, base: BaseModel) -> MachineFinding:
         for name, term in CATALOGUE.items()
         if not (term.needs_covariate or term.has_memory or TermChoice(name) in base.terms)
     ]
-    return MachineFits(uniform_records(campaign, base), base, others, {1}).investigate([], 0)
+    return establish(MachineFits(uniform_records(campaign, base), base, others, {1}), [], 0)
 
 
 @pytest.fixture(scope="module")

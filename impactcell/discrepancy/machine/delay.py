@@ -1,13 +1,19 @@
 """How late the force was recorded, where a base model does not say: what a delay would explain."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from impactcell.discrepancy.machine.regression import fit_blocks
-from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, MIN_SHARE, TermSearch, mean_over_error
+from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, MIN_SHARE, SelectionStep
+from impactcell.discrepancy.machine.ties import MIN_TIED_SHARE, TIE_Z
+from impactcell.discrepancy.machine.trials import TermSearch, mean_over_error
 from impactcell.discrepancy.machine.weak_form import Column
 
 DELAY: Column = ("delay_s", 0.0, 0)
 """Column of how late the force was recorded: the force's derivative."""
+
+AS_LATE = "a force recorded late or early by less than a sample would explain as much as the best term"
+"""Why the best term is not taken where the delay is not known so well."""
 
 
 def explained_by_delay(search: TermSearch, columns: Sequence[Column]) -> tuple[float, float] | None:
@@ -22,6 +28,25 @@ def explained_by_delay(search: TermSearch, columns: Sequence[Column]) -> tuple[f
         return None
     fit = fit_blocks(search.blocks, [*columns, DELAY], search.priors, search.nonnegative)
     return float(fit.coefficients[-1]), min(float(gains.sum()) / excess, 1.0)
+
+
+def told_from_delay(
+    search: TermSearch, columns: Sequence[Column], steps: list[SelectionStep], sample_s: float
+) -> list[SelectionStep]:
+    """Refuse the first step of a selection where a delay of less than a sample would explain about as much.
+
+    That a force was recorded so late or early nobody can exclude who has not stated it.
+    """
+    if not steps or (best := steps[0].accepted) is None:
+        return steps
+    gains = search.losses(columns) - search.losses([*columns, DELAY])
+    as_well = float(gains.sum()) >= MIN_TIED_SHARE * best.gain and mean_over_error(best.gains - gains) < TIE_Z
+    if not as_well or mean_over_error(gains) < MIN_GAIN_Z:
+        return steps
+    fit = fit_blocks(search.blocks, [*columns, DELAY], search.priors, search.nonnegative)
+    if abs(float(fit.coefficients[-1])) > sample_s:
+        return steps
+    return [replace(steps[0], accepted=None, tied_with=(), reason=AS_LATE)]
 
 
 def delay_note(explained: tuple[float, float] | None) -> list[str]:

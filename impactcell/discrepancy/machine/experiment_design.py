@@ -16,8 +16,9 @@ from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.regression import Blocks
-from impactcell.discrepancy.machine.selection import ChosenTerm, TermSearch, Trial, is_tied
 from impactcell.discrepancy.machine.simulation import needed_force, positions_from
+from impactcell.discrepancy.machine.ties import is_tied
+from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch, Trial
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.search import Proposal
 from impactcell.errors import CampaignError
@@ -223,7 +224,9 @@ class _Test:
         choices.sort(key=lambda choice: tie.index(choice.name))
         every = MachineFits((*fits.records, *copies), fits.base, choices, fits.held)
         every.gravity, every.delay_s = finding.final.gravity, finding.final.delay_s
-        blocks, _, _ = every.blocks()
+        every.doubt = fits.doubt
+        every.shapes = {name: fits.shapes[name] for name in every.shapes}
+        blocks, _ = every.blocks()
         if min(record.time_s[-1] for record in change.records) < MIN_BLOCKS * every.block_s:
             raise CampaignError(f"{change.words}: too short to tell anything")
         terms = tuple(term for term in finding.final.terms if term.choice.name != tie[0])
@@ -234,7 +237,10 @@ class _Test:
         """Try the two terms on the old records and some of the copies."""
         new = [self.old + copy * self.kinds + kind for copy in copies for kind in range(self.kinds)]
         chosen = np.isin(self.blocks.fold, [*range(self.old), *new])
-        part = {name: getattr(self.blocks, name)[chosen] for name in ("products", "rows", "noise", "fold")}
+        part = {
+            name: getattr(self.blocks, name)[chosen]
+            for name in ("products", "rows", "noise", "fold", "number")
+        }
         search = TermSearch(
             replace(self.blocks, **part),
             self.fits.candidates,

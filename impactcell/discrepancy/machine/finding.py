@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from impactcell.discrepancy.laws import FittedFunction
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
 from impactcell.discrepancy.machine.regression import Blocks, LinearFit
-from impactcell.discrepancy.machine.selection import ChosenTerm, SelectionStep
+from impactcell.discrepancy.machine.selection import SelectionStep
+from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.discrepancy.search import Proposal

@@ -9,6 +9,7 @@ import numpy as np
 
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
+from impactcell.discrepancy.machine.establishing import establish
 from impactcell.discrepancy.machine.experiment_design import with_experiments
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.fine_sampling import finely_sampled
@@ -66,7 +67,7 @@ def investigate_machine(
     candidates = _candidates(base, records)
     fits = MachineFits(records, base, candidates, _held_records(records, train, test))
     _check_blocks(fits)
-    finding = fits.investigate([*notes_of(data_faults), *notes], seed)
+    finding = establish(fits, [*notes_of(data_faults), *notes], seed)
     models = finding.nominal, finding.final
     finding = replace(finding, simulated=tuple(simulate_held_out(finding, model) for model in models))
     return with_experiments(fits, with_law(fits, finding))
@@ -102,7 +103,7 @@ def _check_blocks(fits: MachineFits) -> None:
             "nowhere does the part move faster than the noise of its position shows: record a larger or "
             "faster motion, or state noise_std_m (of a rotation noise_std_rad) in campaign.yaml if it is less"
         )
-    training, held_out, _ = fits.blocks()
+    training, held_out = fits.blocks()
     if not (len(training) and len(held_out)):
         thirds = fits.held is None
         raise CampaignError(

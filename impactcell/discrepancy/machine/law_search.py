@@ -23,14 +23,10 @@ from impactcell.discrepancy.machine.regression import (
     out_of_fold_losses,
 )
 from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, SPLINE_PIECES, splines
-from impactcell.discrepancy.machine.selection import (
-    MIN_GAIN_Z,
-    MIN_SHARE_OF_FREE,
-    TIE_Z,
-    ChosenTerm,
-    mean_over_error,
-)
+from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, MIN_SHARE_OF_FREE
 from impactcell.discrepancy.machine.simulation import resistance, simulate_held_out
+from impactcell.discrepancy.machine.ties import TIE_Z
+from impactcell.discrepancy.machine.trials import ChosenTerm, mean_over_error
 from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, Column
 from impactcell.records import Samples
 
@@ -73,7 +69,7 @@ def with_law(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
 def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | str:
     """Find a law beside the final model, whose nuisances are those of `fits`."""
     own = tuple(term.choice for term in finding.final.terms[len(finding.nominal.terms) :])
-    training, held_out, _ = fits.blocks(fits.rows_with(own, splines))
+    training, held_out = fits.blocks(fits.rows_with(own, splines))
     columns = fits.columns(finding.final.terms)
     fit = fit_blocks(training, columns, fits.priors, fits.nonnegative)
     model = replace(finding.final, base=fits.base, fit=fit)
@@ -191,7 +187,7 @@ class _Forms:
         forms: Sequence[TermChoice],
     ) -> None:
         self.fits, self.model, self.forms = fits, model, forms
-        self.training, self.held_out, _ = fits.blocks(fits.rows_with(choices, splines))
+        self.training, self.held_out = fits.blocks(fits.rows_with(choices, splines))
 
     def _fit_columns(self, form: TermChoice) -> list[Column]:
         return [*self.model.fit.columns, *ChosenTerm(form, 0.0).columns]

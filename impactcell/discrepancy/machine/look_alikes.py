@@ -6,7 +6,7 @@ import numpy as np
 
 from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.regression import Blocks
-from impactcell.discrepancy.machine.selection import ChosenTerm
+from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.weak_form import Column
 
 MACHINE: tuple[Column, ...] = tuple(

@@ -9,11 +9,15 @@ from typing import Self
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, TermChoice
-from impactcell.discrepancy.machine.delay import DELAY, delay_note, explained_by_delay
-from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
+from impactcell.discrepancy.machine.delay import DELAY
+from impactcell.discrepancy.machine.direction_doubt import (
+    DirectionDoubt,
+    floors_left,
+    residual_of,
+    weighed,
+)
+from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.law_terms import term_of
-from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine
-from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
 from impactcell.discrepancy.machine.regression import (
     BLOCKS_OF_RECORD,
     PIECES_PER_BLOCK,
@@ -22,14 +26,8 @@ from impactcell.discrepancy.machine.regression import (
     blocks_of,
     fit_blocks,
 )
-from impactcell.discrepancy.machine.remainder import remainder_of
 from impactcell.discrepancy.machine.rival_forms import Basis
-from impactcell.discrepancy.machine.selection import (
-    ChosenTerm,
-    SelectionStep,
-    TermSearch,
-    select_terms,
-)
+from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, motion_scale
 from impactcell.discrepancy.machine.weak_form import (
     ECCENTRICITY,
@@ -37,6 +35,7 @@ from impactcell.discrepancy.machine.weak_form import (
     IndexArray,
     Rows,
     build_rows,
+    finer_grid,
     shape_grid,
 )
 
@@ -48,6 +47,11 @@ DELAY_STEPS = 9
 """Delays that are tried first, evenly over what the prior allows [1]."""
 DELAY_ROUNDS = 2
 """Gauss-Newton steps from the best of them, none further than from one to the next."""
+WEIGHINGS = 3
+"""Rounds in which a model and the weights of the rows settle [1]."""
+REFINEMENTS = 5
+"""Rounds in which the grid of a shape is made finer about its best value, a round by a quarter."""
+COULOMB: Column = ("coulomb_friction", 0.0, 0)
 NUISANCES = ("force_gain", "force_offset", "gravity_torque", "position_offset", "inertia", "delay_s")
 """Numbers of a base model that are columns of the regression."""
 
@@ -82,7 +86,9 @@ class MachineFits:
         self.delay_s = base.delay_s.value
         self.priors: dict[Column, NumberPrior] = {}
         self._set_priors()
+        self.doubt = DirectionDoubt()
         self._rows = lru_cache(maxsize=4)(self._build)
+        self._weighed = lru_cache(maxsize=4)(weighed)
         self.shapes = {
             choice.name: shape_grid(term_of(choice), self.scale) for choice in (*base.terms, *self.candidates)
         }
@@ -91,7 +97,8 @@ class MachineFits:
         """Leave free how far off its centre the encoder turns."""
         base = replace(self.base, position_eccentricity=NumberPrior(0.0, math.inf))
         fits = type(self)(self.records, base, self.candidates, self.held)
-        fits.gravity, fits.delay_s = self.gravity, self.delay_s
+        fits.gravity, fits.delay_s, fits.doubt = self.gravity, self.delay_s, self.doubt
+        fits.shapes = dict(self.shapes)
         return fits
 
     def _set_priors(self) -> None:
@@ -107,11 +114,16 @@ class MachineFits:
                 self.priors[ECCENTRICITY, 0.0, number] = self.base.position_eccentricity
 
     def _build(self, gravity: float, delay_s: float) -> Rows:
-        return build_rows(self.records, self.base, self.candidates, (gravity, delay_s))
+        shapes = self._shapes_of((*self.base.terms, *self.candidates))
+        return build_rows(self.records, self.base, shapes, (gravity, delay_s))
+
+    def _shapes_of(self, choices: Iterable[TermChoice]) -> dict[TermChoice, tuple[float, ...]]:
+        """Values of the shapes of some terms; a law has none."""
+        return {choice: self.shapes.get(choice.name, (0.0,)) for choice in choices}
 
     def rows(self) -> Rows:
-        """Rows at the gravity and delay of now."""
-        return self._rows(self.gravity, self.delay_s)
+        """Rows at the gravity and delay of now, weighed."""
+        return self._weighed(self._rows(self.gravity, self.delay_s), self.doubt)
 
     @property
     def nonnegative(self) -> frozenset[Column]:
@@ -126,14 +138,21 @@ class MachineFits:
 
     def rows_with(self, choices: Sequence[TermChoice], basis: Basis) -> Rows:
         """Rows at the same, of other terms beside the base model's, and of free forms in another basis."""
-        return build_rows(self.records, self.base, choices, (self.gravity, self.delay_s), basis)
+        shapes = self._shapes_of((*self.base.terms, *choices))
+        rows = build_rows(self.records, self.base, shapes, (self.gravity, self.delay_s), basis)
+        return weighed(rows, self.doubt)
 
-    def blocks(self, rows: Rows | None = None) -> tuple[Blocks, Blocks, IndexArray]:
-        """Training and held-out blocks, and the block of each row; of the rows of now, or of others."""
-        rows = rows or self.rows()
-        number: IndexArray = (rows.record * BLOCKS_OF_RECORD + np.floor(rows.time_s / self.block_s)).astype(
+    def _number(self, rows: Rows) -> IndexArray:
+        """Block of each row."""
+        number: IndexArray = (BLOCKS_OF_RECORD * rows.record + np.floor(rows.time_s / self.block_s)).astype(
             np.int64
         )
+        return number
+
+    def blocks(self, rows: Rows | None = None) -> tuple[Blocks, Blocks]:
+        """Training and held-out blocks of the rows of now, or of others."""
+        rows = rows or self.rows()
+        number = self._number(rows)
         sizes = {
             int(block): int(count)
             for block, count in zip(*np.unique(number, return_counts=True), strict=True)
@@ -147,11 +166,7 @@ class MachineFits:
             fold = {block: records.index(block // BLOCKS_OF_RECORD) for block in fitted}
         else:
             fold = {block: place * FOLDS // len(fitted) for place, block in enumerate(fitted)}
-        return (
-            blocks_of(rows, number, fold),
-            blocks_of(rows, number, dict.fromkeys(held, 0)),
-            number,
-        )
+        return blocks_of(rows, number, fold), blocks_of(rows, number, dict.fromkeys(held, 0))
 
     def _is_held(self, block: int, whole: list[int]) -> bool:
         record = block // BLOCKS_OF_RECORD
@@ -168,7 +183,7 @@ class MachineFits:
         """Fit a model to the training blocks; with `settle` gravity and delay are found with it."""
         if settle:
             self._settle(terms)
-        training, _, _ = self.blocks()
+        training, _ = self.blocks()
         fit = fit_blocks(training, self.columns(terms), self.priors, self.nonnegative)
         delay_s = self.base.delay_s.value
         if DELAY in fit.columns:
@@ -181,7 +196,7 @@ class MachineFits:
             if not self.base.delay_s.is_held:
                 self._settle_delay(terms)
             if free_gravity:
-                training, _, _ = self.blocks()
+                training, _ = self.blocks()
                 fit = fit_blocks(training, self.columns(terms), self.priors, self.nonnegative)
                 place = fit.columns.index(("gravity_torque", 0.0, 0))
                 self.gravity = self.base.gravity_torque.value + float(fit.coefficients[place])
@@ -190,12 +205,13 @@ class MachineFits:
     def _settle_delay(self, terms: tuple[ChosenTerm, ...]) -> None:
         """Take the delay of least squares on the training blocks, with its prior."""
         prior = self.base.delay_s
-        beside = [term.choice for term in terms if term.choice not in self.base.terms]
+        shapes = {term.choice: (term.shape,) for term in terms}
         columns = [column for column in self.columns(terms) if column != DELAY]
 
         def loss(delay: float) -> float:
             base = replace(self.base, delay_s=NumberPrior(delay))
-            training, _, _ = self.blocks(build_rows(self.records, base, beside, (self.gravity, delay)))
+            rows = build_rows(self.records, base, shapes, (self.gravity, delay))
+            training, _ = self.blocks(weighed(rows, self.doubt))
             fit = fit_blocks(training, columns, self.priors, self.nonnegative)
             squares = float(training.losses(fit.columns, fit.coefficients).sum())
             piece = squares / (PIECES_PER_BLOCK * len(training))
@@ -205,90 +221,65 @@ class MachineFits:
         self.delay_s = min(map(float, tried), key=loss)
         apart = float(tried[1] - tried[0])
         for _ in range(DELAY_ROUNDS):
-            rows = build_rows(self.records, self.base, beside, (self.gravity, self.delay_s))
-            training, _, _ = self.blocks(rows)
+            rows = build_rows(self.records, self.base, shapes, (self.gravity, self.delay_s))
+            training, _ = self.blocks(weighed(rows, self.doubt))
             fit = fit_blocks(training, [*columns, DELAY], self.priors, self.nonnegative)
             nearer = prior.value + float(fit.coefficients[-1])
             self.delay_s = float(np.clip(nearer, self.delay_s - apart, self.delay_s + apart))
 
-    def investigate(self, notes: list[str], seed: int) -> MachineFinding:
-        """Select on training blocks, prove on held-out ones."""
-        base_terms = tuple(ChosenTerm(choice, self.shapes[choice.name][0]) for choice in self.base.terms)
-        base_terms = self._with_best_shapes(base_terms)
-        nominal = self.fit(base_terms, settle=True)
-        training, held_out, _ = self.blocks()
-        steps: list[SelectionStep] = []
-        enough = MachineFinding.enough(training, held_out)
-        if enough:
-            candidates = [
-                choice for choice in self.candidates if not self._is_like_the_machine(training, choice)
-            ]
-            notes = [*notes, *alike_note(self.candidates, candidates)]
-            search = TermSearch(training, candidates, self.shapes, self.priors, self.nonnegative)
-            steps = select_terms(search, self.columns(base_terms))
-            notes += [step.note for step in steps if step.note]
-        proposed = [step.accepted.term for step in steps if step.accepted is not None]
-        before = nominal
-        falls: dict[str, FallOfGap] = {}
-        for place, term in enumerate(proposed):
-            after = self.fit((*base_terms, *proposed[: place + 1]), settle=False)
-            fall = fall_of_gap(held_out, before, after, seed)
-            if not fall.is_real:
-                break
-            falls[term.choice.name] = fall
-            before = after
-        final = before
-        if falls and not self.base.delay_s.is_held:
-            nominal_blocks = (training, held_out)
-            final = self.fit(final.terms, settle=True)
-            training, held_out = nominal_blocks
-        if enough and self.base.delay_s.is_held:
-            notes = [*notes, *delay_note(explained_by_delay(search, self.columns(final.terms)))]
-        established = tuple(falls)
-        return MachineFinding(
-            base=self.base,
-            records=self.records,
-            steps=tuple(steps),
-            established=established,
-            unconfirmed=tuple(term.choice.name for term in proposed if term.choice.name not in falls),
-            falls=falls,
-            nominal=nominal,
-            final=final,
-            training=training,
-            held_out=held_out,
-            train_gaps=(gap(training, nominal), gap(training, before)),
-            expected=expected_gap(held_out, before),
-            fall=fall_of_gap(held_out, nominal, before, seed),
-            held_spans=self._held_spans(),
-            remainder=remainder_of(self.rows(), final, self.records),
-            block_s=self.block_s,
-            scale=self.scale,
-            notes=tuple(notes),
-            seed=seed,
-        )
+    def weigh(self, model: FittedModel) -> None:
+        """Weigh rows by how surely they know the direction of friction, by what a model leaves."""
+        own = [term for term in model.terms if not term_of(term.choice).is_friction]
+        for _ in range(WEIGHINGS):
+            training, _ = self.blocks()
+            level = fit_blocks(training, [*self.columns(own), COULOMB], self.priors, self.nonnegative)
+            fit = fit_blocks(training, self.columns(model.terms), self.priors, self.nonnegative)
+            rows = self._rows(self.gravity, self.delay_s)
+            residual = residual_of(rows, fit.columns, fit.coefficients)
+            friction = float(level.coefficients[-1])
+            chosen = np.isin(self._number(rows), training.number)
+            self.doubt = DirectionDoubt(friction, floors_left(rows, residual, chosen, friction))
 
-    def _is_like_the_machine(self, training: Blocks, choice: TermChoice) -> bool:
-        """Whether a candidate at every value of its shape looks like inertia, gravity or drive."""
-        terms = [ChosenTerm(choice, shape) for shape in self.shapes[choice.name]]
-        return all(like_the_machine(training, term) for term in terms)
-
-    def _with_best_shapes(self, terms: tuple[ChosenTerm, ...]) -> tuple[ChosenTerm, ...]:
-        """Give each term of the base model the shape of least squares, one after the other."""
+    def with_best_shapes(self, terms: tuple[ChosenTerm, ...]) -> tuple[ChosenTerm, ...]:
+        """Give each term the shape of least squares, on its grid and between, one after the other."""
         for place, term in enumerate(terms):
-            tried = []
-            for shape in self.shapes[term.choice.name]:
-                other = (*terms[:place], ChosenTerm(term.choice, shape), *terms[place + 1 :])
-                training, _, _ = self.blocks()
-                fit = fit_blocks(training, self.columns(other), self.priors, self.nonnegative)
-                tried.append((float(training.losses(fit.columns, fit.coefficients).sum()), other))
-            terms = min(tried, key=lambda pair: pair[0])[1]
+            shape = self._best_shape(terms, place, self.shapes[term.choice.name])
+            terms = (*terms[:place], ChosenTerm(term.choice, shape), *terms[place + 1 :])
+            terms = self.with_shape_refined(terms, place)
         return terms
 
-    def _held_spans(self) -> tuple[tuple[int, float, float], ...]:
+    def with_shape_refined(self, terms: tuple[ChosenTerm, ...], place: int) -> tuple[ChosenTerm, ...]:
+        """Give one of the terms the shape of least squares between the neighbours of its own on the grid."""
+        choice, shape = terms[place].choice, terms[place].shape
+        grid = self.shapes[choice.name]
+        if len(grid) == 1:
+            return terms
+        finer = grid
+        for _ in range(REFINEMENTS):
+            finer = finer_grid(finer, shape)
+            shape = self._best_shape(terms, place, finer)
+        self.shapes[choice.name] = tuple(sorted({*grid, shape}))
+        self._rows.cache_clear()
+        return (*terms[:place], ChosenTerm(choice, shape), *terms[place + 1 :])
+
+    def _best_shape(self, terms: tuple[ChosenTerm, ...], place: int, grid: Sequence[float]) -> float:
+        """Value of the shape of one of the terms that leaves least of the training blocks."""
+        if len(grid) == 1:
+            return grid[0]
+        shapes = {term.choice: (term.shape,) for term in terms} | {terms[place].choice: tuple(grid)}
+        rows = build_rows(self.records, self.base, shapes, (self.gravity, self.delay_s))
+        training, _ = self.blocks(weighed(rows, self.doubt))
+
+        def loss(shape: float) -> float:
+            other = (*terms[:place], ChosenTerm(terms[place].choice, shape), *terms[place + 1 :])
+            fit = fit_blocks(training, self.columns(other), self.priors, self.nonnegative)
+            return float(training.losses(fit.columns, fit.coefficients).sum())
+
+        return min(grid, key=loss)
+
+    def held_spans(self) -> tuple[tuple[int, float, float], ...]:
         """Record, begin and end of each stretch of held-out blocks."""
-        rows = self.rows()
-        number = (rows.record * BLOCKS_OF_RECORD + np.floor(rows.time_s / self.block_s)).astype(np.int64)
-        whole = [int(block) for block in np.unique(number)]
+        whole = [int(block) for block in np.unique(self._number(self.rows()))]
         spans = []
         for place, record in enumerate(self.records):
             held = [

@@ -35,6 +35,8 @@ class Blocks:
         Sum of the rows' variances by the sensors' noise.
     fold : ndarray of int, shape (b,)
         Cross-validation leaves out one fold at a time.
+    number : ndarray of int, shape (b,)
+        Which blocks they are.
     without_folds : ndarray, shape (f, p + 1, p + 1)
         Sums of products over all blocks but those of each fold, folds in their order.
     """
@@ -44,6 +46,7 @@ class Blocks:
     rows: Samples
     noise: Samples
     fold: IndexArray
+    number: IndexArray
     without_folds: Samples = field(init=False)
 
     def __post_init__(self) -> None:
@@ -113,7 +116,12 @@ def blocks_of(rows: Rows, number: IndexArray, fold: Mapping[int, int]) -> Blocks
     size = len(names) + 1
     stacked = np.array(products).reshape(-1, size, size)
     return Blocks(
-        names, stacked, np.array(counts), np.array(noise), np.array([*fold.values()], dtype=np.int64)
+        names,
+        stacked,
+        np.array(counts),
+        np.array(noise),
+        np.array([*fold.values()], dtype=np.int64),
+        np.array([*fold], dtype=np.int64),
     )
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from impactcell.discrepancy.machine.direction_doubt import residual_of
 from impactcell.discrepancy.machine.finding import FittedModel, Remainder
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import Rows
@@ -18,10 +19,7 @@ FEW_RECORDS = 1.0 / 3.0
 
 def remainder_of(rows: Rows, model: FittedModel, records: Sequence[UniformRecord]) -> Remainder:
     """Look at what a model leaves, record by record, held-out ones included."""
-    residual = rows.target - sum(
-        value * rows.columns[column]
-        for column, value in zip(model.fit.columns, model.fit.coefficients, strict=True)
-    )
+    residual = residual_of(rows, model.fit.columns, model.fit.coefficients)
     inside = [np.flatnonzero(rows.record == place) for place in range(len(records))]
     left = np.array(
         [max(float(np.sum(residual[rows_of] ** 2 - rows.variance[rows_of])), 0.0) for rows_of in inside]

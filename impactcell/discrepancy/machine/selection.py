@@ -9,12 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-import numpy as np
-
-from impactcell.discrepancy.machine.base_model import NumberPrior, TermChoice
-from impactcell.discrepancy.machine.law_terms import term_of
-from impactcell.discrepancy.machine.regression import Blocks, out_of_fold_losses
+from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS, PLACES
+from impactcell.discrepancy.machine.ties import MAX_FLOOR, is_tied, tied_terms
+from impactcell.discrepancy.machine.trials import TermSearch, Trial, mean_over_error
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.records import Samples
 
@@ -27,67 +25,13 @@ MIN_SHARE_OF_ALL = 0.5
 """Share of what all terms together close that a term has to close: beside a model error it stands out [1]."""
 MIN_SHARE_OF_FREE = 0.8
 """Share of what a free form in the same place closes that a named term has to close [1]."""
-TIE_Z = 2.2
-"""Difference of two terms over its standard error up to which they are tied [1]."""
-MIN_TIED_SHARE = 0.8
-"""Share of the best term's gain below which another one is not tied whatever the scatter [1]."""
-EQUAL_SHARE = 0.97
-"""Share of the best term's gain from which on another one is tied whatever the scatter [1]."""
 MAX_TERMS = 2
 """Terms that one run takes, the second only if nothing is left then: any other is likelier to be a patch on
 what the catalogue lacks [1]."""
-MAX_FLOOR = 1.3
-"""Gap in noise floors up to which a model leaves nothing, as in the workflow of shots [1]."""
 MIN_SECOND_GAP = 2.0
 """Gap in noise floors beside the first term from which on a second one is named [1]."""
 NOT_IN_EVERY_BLOCK = "no term does better in block after block that it was not fitted to"
 """Why the best term is not taken where its gain scatters too much from block to block."""
-
-
-@dataclass(frozen=True, slots=True)
-class ChosenTerm:
-    """A term at a value of its shape."""
-
-    choice: TermChoice
-    shape: float
-
-    @property
-    def columns(self) -> tuple[Column, ...]:
-        """Its columns of the regression."""
-        strengths = term_of(self.choice).strengths
-        return tuple((self.choice.name, self.shape, number) for number in range(len(strengths)))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Trial:
-    """One candidate beside a model.
-
-    Attributes
-    ----------
-    term : ChosenTerm
-    gains : ndarray, shape (b,)
-        Fall of each block's squared residual out of fold.
-    shares : ndarray, shape (b,)
-        The same over that residual, between -1 and 1: where a motion dies away its first blocks gain most,
-        and the later ones tell as surely.
-    at_end : bool
-        Its shape came to the end of its grid.
-    """
-
-    term: ChosenTerm
-    gains: Samples
-    shares: Samples
-    at_end: bool
-
-    @property
-    def gain(self) -> float:
-        """Fall of the squared residual over all blocks."""
-        return float(self.gains.sum())
-
-    @property
-    def z(self) -> float:
-        """Mean gain over its standard error, or mean share of a gain over its own, whichever is larger."""
-        return max(mean_over_error(self.gains), mean_over_error(self.shares))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -130,58 +74,12 @@ class SelectionStep:
         return f"{name} shows only beside {beside}, which hides it on these records; {beside} is not named."
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TermSearch:
-    """What a selection works with.
-
-    Attributes
-    ----------
-    blocks : Blocks
-        Of the training records.
-    candidates : sequence of TermChoice
-    shapes : mapping
-        Grid of each candidate by its name.
-    priors : mapping
-    nonnegative : frozenset of Column
-    """
-
-    blocks: Blocks
-    candidates: Sequence[TermChoice]
-    shapes: Mapping[str, tuple[float, ...]]
-    priors: Mapping[Column, NumberPrior]
-    nonnegative: frozenset[Column]
-
-    def losses(self, columns: Sequence[Column]) -> Samples:
-        """Out-of-fold squared residual of every block, shape (b,)."""
-        return out_of_fold_losses(self.blocks, columns, self.priors, self.nonnegative)
-
-    def gap(self, columns: Sequence[Column]) -> float:
-        """Gap of a model out of fold [1 = noise floor]."""
-        return math.sqrt(float(self.losses(columns).sum()) / max(float(self.blocks.noise.sum()), 1e-300))
-
-    def shares(self, gains: Samples, before: Samples) -> Samples:
-        """Gains over what each block had left, no less than the sensors' noise; shape (b,)."""
-        left = np.maximum(np.maximum(before, self.blocks.noise), np.finfo(float).tiny)
-        return np.clip(gains / left, -1.0, 1.0)
-
-    def best_shape(self, choice: TermChoice, columns: Sequence[Column], before: Samples) -> Trial:
-        """Try a candidate at every value of its shape."""
-        grid = self.shapes[choice.name]
-        trials = []
-        for shape in grid:
-            term = ChosenTerm(choice, shape)
-            gains = before - self.losses([*columns, *term.columns])
-            at_end = len(grid) > 1 and shape in (grid[0], grid[-1])
-            trials.append(Trial(term, gains, self.shares(gains, before), at_end))
-        return max(trials, key=lambda trial: trial.gain)
-
-
 def select_terms(search: TermSearch, columns: Sequence[Column]) -> list[SelectionStep]:
-    """Add terms one by one to the base model's columns; the last step says why it ended."""
+    """Add terms one by one to the base model's columns; the last says why no more are taken."""
     steps: list[SelectionStep] = []
     columns = list(columns)
     remaining = list(search.candidates)
-    while True:
+    while remaining:
         step = _step(search, columns, remaining)
         if steps and step.accepted is not None and not _is_second(search, columns, step.accepted):
             refused = "beside a remainder one term is named at most"
@@ -191,6 +89,7 @@ def select_terms(search: TermSearch, columns: Sequence[Column]) -> list[Selectio
             return steps
         columns += step.accepted.term.columns
         remaining.remove(step.accepted.term.choice)
+    return steps
 
 
 def _is_second(search: TermSearch, columns: Sequence[Column], trial: Trial) -> bool:
@@ -206,7 +105,10 @@ def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermCh
         (search.best_shape(choice, columns, before) for choice in candidates), key=lambda one: -one.gain
     )
     free_gains = {
-        form: float((before - search.losses([*columns, *_free_columns(form)])).sum()) for form in FREE_FORMS
+        form: float(
+            (before - search.losses([*columns, *((form, 0.0, number) for number in range(KNOTS))])).sum()
+        )
+        for form in FREE_FORMS
     }
     every = [column for trial in trials if trial.gain > 0.0 for column in trial.term.columns]
     gain_of_all = float((before - search.losses([*columns, *every])).sum())
@@ -219,7 +121,7 @@ def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermCh
             return SelectionStep(tuple(trials), free_gains, gain_of_all, excess, shown[0], (), "", shown[1])
     tied: tuple[str, ...] = ()
     if not reason:
-        tied = tuple(trial.term.choice.name for trial in trials[1:] if is_tied(best, trial))
+        tied = tied_terms(search, before, best, trials[1:])
     return SelectionStep(
         tuple(trials), free_gains, gain_of_all, excess, None if reason else best, tied, reason
     )
@@ -248,7 +150,9 @@ def _beside_another(
             shown.append((pair, replace(best, gains=own, shares=search.shares(own, before))))
     if not shown:
         return None
-    pair, own_trial = max(shown, key=lambda item: item[0].gain)
+    most = max((pair for pair, _ in shown), key=lambda pair: pair.gain)
+    about = [item for item in shown if item[0] is most or is_tied(most, item[0])]
+    pair, own_trial = max(about, key=lambda item: mean_over_error(item[0].gains))
     for one, two in combinations(others, 2):
         together = before - search.losses([*columns, *one.term.columns, *two.term.columns])
         if is_tied(pair, replace(pair, gains=together, shares=search.shares(together, before))):
@@ -270,22 +174,3 @@ def _refusal(best: Trial, free_gains: Mapping[str, float], gain_of_all: float, e
     if best.gain < MIN_SHARE_OF_FREE * free:
         return "a free form in the same place does much better than any named term"
     return ""
-
-
-def is_tied(best: Trial, rival: Trial) -> bool:
-    """Whether the blocks cannot tell a term that does worse from the best one."""
-    if rival.gain < MIN_TIED_SHARE * best.gain or rival.at_end:
-        return False
-    apart = mean_over_error(best.gains - rival.gains), mean_over_error(best.shares - rival.shares)
-    return rival.gain >= EQUAL_SHARE * best.gain or max(apart) < TIE_Z
-
-
-def mean_over_error(values: Samples) -> float:
-    """Mean over its standard error; inf where nothing scatters, 0 where there is nothing."""
-    error = float(values.std(ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else math.inf
-    mean = float(values.mean())
-    return mean / error if error > 0.0 else math.inf * mean if mean else 0.0
-
-
-def _free_columns(form: str) -> list[Column]:
-    return [(form, 0.0, number) for number in range(KNOTS)]

@@ -10,13 +10,22 @@ TEST_FUNCTION_POWER = 4
 
 def smoothed_speed(position: Samples, half: int, step: float) -> tuple[Samples, float]:
     """Differentiate by weighted slopes over `2 half + 1` samples: shape (n,), and noise per noise of one."""
-    # A cubic's slope in its middle: a parabola of the speed within the support leaves no error.
+    weight = _slope(half) / step
+    padded = np.pad(position, half, mode="reflect", reflect_type="odd")
+    return np.convolve(padded, weight[::-1], "valid"), speed_noise(half, step)
+
+
+def speed_noise(half: int, step: float) -> float:
+    """Noise of a smoothed speed per noise of a position."""
+    return float(np.linalg.norm(_slope(half))) / step
+
+
+def _slope(half: int) -> Samples:
+    """Weights of the slope of a cubic in its middle: a parabola of the speed within them leaves no error."""
     lever = np.arange(-half, half + 1.0)
     second, fourth, sixth = (float(np.sum(lever**power)) for power in (2, 4, 6))
-    weight = (sixth * lever - fourth * lever**3) / (second * sixth - fourth**2)
-    padded = np.pad(position, half, mode="reflect", reflect_type="odd")
-    weight /= step
-    return np.convolve(padded, weight[::-1], "valid"), float(np.sqrt(weight @ weight))
+    weight: Samples = (sixth * lever - fourth * lever**3) / (second * sixth - fourth**2)
+    return weight
 
 
 def smoothed_acceleration(position: Samples, half: int, step: float) -> Samples:
@@ -33,12 +42,16 @@ def averaged(values: Samples, half: int, step: float) -> Samples:
 
 
 def test_function(half: int, step: float) -> tuple[Samples, Samples]:
-    """Weights of a mean, and of the mean second derivative by second differences, shape (2 half + 3,)."""
+    """Weights of a mean, and of the mean second derivative by second differences, shape (2 half + 3,).
+
+    A second difference is q'' and a twelfth of the second difference of q'', to the fourth order of the step;
+    the weights of the mean are so too (Numerov 1924), and the two belong together.
+    """
     place = np.arange(-half - 1, half + 2) / (half + 1.0)
     weight = np.maximum(1.0 - place**2, 0.0) ** TEST_FUNCTION_POWER
     weight /= weight.sum()
     curvature = np.convolve(weight, [1.0, -2.0, 1.0], "same") / step**2
-    return weight, curvature
+    return np.convolve(weight, np.array([1.0, 10.0, 1.0]) / 12.0, "same"), curvature
 
 
 def test_slope(weight: Samples, step: float) -> Samples:

@@ -9,7 +9,7 @@ import numpy as np
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
 from impactcell.discrepancy.machine.channel_values import LARGEST, held_mean, without_spikes
-from impactcell.discrepancy.machine.smoothing import smoothed_acceleration
+from impactcell.discrepancy.machine.smoothing import smoothed_acceleration, speed_noise
 from impactcell.errors import CampaignError
 from impactcell.features import drive_noise_std, is_command, white_noise_std
 from impactcell.records import Capture, Samples
@@ -19,7 +19,11 @@ MIN_HALF_SUPPORT = 5
 PERIODS_PER_SUPPORT = 0.25
 """Support of a test function over the period of the motion: a half swing has four rows [1]."""
 SPEED_SUPPORT_SHARE = 0.25
-"""Support by which a speed is smoothed, over that of a test function: direction turns fast [1]."""
+"""Support by which a speed is smoothed at most, over that of a test function: direction turns fast [1]."""
+MIN_SPEED_SUPPORT = 3
+"""And at least, on either side [samples]."""
+MAX_SPEED_NOISE = 0.001
+"""Noise of a speed over the largest one, down to which it is smoothed: a fifth of what is turning [1]."""
 MAX_HIDDEN_SHARE = 0.25
 """Share of the force's mean square that averaging over a test function may hide of the inertial force [1]."""
 SPANS_PER_PERIOD = 11.0
@@ -258,7 +262,14 @@ def half_supports(record: UniformRecord, scale: MotionScale) -> tuple[int, int]:
     """Half support of a test function and of the smoothing of speeds [samples]."""
     half = max(int(0.5 * PERIODS_PER_SUPPORT * scale.period_s / record.step_s), MIN_HALF_SUPPORT)
     half = min(half, len(record.position) // 8)
-    return half, max(int(SPEED_SUPPORT_SHARE * half), 3)
+    widest = max(int(SPEED_SUPPORT_SHARE * half), MIN_SPEED_SUPPORT)
+    narrow = MIN_SPEED_SUPPORT
+    while (
+        narrow < widest
+        and speed_noise(narrow, record.step_s) * record.noise[0] > MAX_SPEED_NOISE * scale.speed
+    ):
+        narrow += 1
+    return half, narrow
 
 
 def carried_load(

@@ -33,8 +33,13 @@ TURNING_SPEED_SHARE = 0.005
 """Speed below which the direction of motion counts as between -1 and 1, over the largest [1]."""
 TURNING_NOISES = 2.0
 """And at least this many standard deviations of the speed's noise [1]."""
+KINK_SHARE = 0.08
+"""Shift of a smoothed speed at a kink, over its change within the smoothing either side: 5/64 for a cubic's
+slope over many samples [1]."""
 MAX_RESTING_SHARE = 0.5
 """Share of a row's support at rest beyond which it says nothing of friction: the part may stick [1]."""
+FINER = 9
+"""Values between two neighbours of one on the grid of a shape."""
 ECCENTRICITY = "position_eccentricity"
 """Columns of an encoder that turns off its centre: e_c and e_s."""
 
@@ -53,6 +58,8 @@ class Rows:
         Place of the record, and centre of the test function in it.
     variance : ndarray, shape (n,)
         Of the target by the sensors' noise alone.
+    doubt : ndarray, shape (n,)
+        Share of the row in which the direction of motion is not known: 0 where the part slides all along.
     """
 
     target: Samples
@@ -60,12 +67,13 @@ class Rows:
     record: Samples
     time_s: Samples
     variance: Samples
+    doubt: Samples
 
 
 def build_rows(
     records: Sequence[UniformRecord],
     base: BaseModel,
-    candidates: Sequence[TermChoice],
+    shapes: Mapping[TermChoice, Sequence[float]],
     gravity_and_delay: tuple[float, float],
     basis: Basis = hats,
 ) -> Rows:
@@ -75,8 +83,8 @@ def build_rows(
     ----------
     records : sequence of UniformRecord
     base : BaseModel
-    candidates : sequence of TermChoice
-        Terms beside those of the base model.
+    shapes : mapping
+        Terms, those of the base model among them, and the values of the shape of each.
     gravity_and_delay : (float, float)
         G as it is known so far, by which load and zero of the position go, and how late the force was
         recorded.
@@ -84,20 +92,21 @@ def build_rows(
         Of the free forms.
     """
     scale = motion_scale(records, base.response, gravity_and_delay[0])
-    parts = [_record_rows(record, base, candidates, gravity_and_delay, (scale, basis)) for record in records]
+    parts = [_record_rows(record, base, shapes, gravity_and_delay, (scale, basis)) for record in records]
     return Rows(
         np.concatenate([part.target for part in parts]),
         {name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns},
         np.concatenate([np.full(part.target.size, place) for place, part in enumerate(parts)]),
         np.concatenate([part.time_s for part in parts]),
         np.concatenate([part.variance for part in parts]),
+        np.concatenate([part.doubt for part in parts]),
     )
 
 
 def _record_rows(
     record: UniformRecord,
     base: BaseModel,
-    candidates: Sequence[TermChoice],
+    shapes: Mapping[TermChoice, Sequence[float]],
     gravity_and_delay: tuple[float, float],
     scale_and_basis: tuple[MotionScale, Basis],
 ) -> Rows:
@@ -124,11 +133,11 @@ def _record_rows(
         ("gravity_torque", 0.0, 0): -np.sin(record.position),
         ("position_offset", 0.0, 0): gravity * np.cos(record.position),
     }
-    for choice in (*base.terms, *candidates):
+    for choice, values_of_shape in shapes.items():
         term = term_of(choice)
         value = record.covariates.get(choice.covariate, 0.0)
         motion = MotionState(record.position, velocity, load, value * one)
-        for shape in shape_grid(term, scale):
+        for shape in values_of_shape:
             for number, feature in enumerate(term.features(motion, shape)):
                 raw[choice.name, shape, number] = -direction * feature if term.is_friction else feature
     motion = MotionState(record.position, velocity, load, one)
@@ -153,7 +162,16 @@ def _record_rows(
     target += (delay_s - base.delay_s.value) * columns["delay_s", 0.0, 0]
     sensors = (record.inertia * record.noise[0]) ** 2 * float(curvature @ curvature)
     sensors += record.noise[1] ** 2 * float(weight @ weight)
-    return Rows(target, columns, np.zeros(target.size), record.time_s[centres], np.full(target.size, sensors))
+    return Rows(
+        target,
+        columns,
+        np.zeros(target.size),
+        record.time_s[centres],
+        np.full(target.size, sensors),
+        _averaged(
+            doubt_of_direction(velocity, scale, record.noise[0] * speed_noise, narrow), weight, centres
+        ),
+    )
 
 
 def eccentricity_waves(position: Samples) -> Samples:
@@ -163,9 +181,26 @@ def eccentricity_waves(position: Samples) -> Samples:
 
 def direction_of_motion(velocity: Samples, scale: MotionScale, speed_noise: float) -> Samples:
     """-1 or 1, and between them where the part turns or rests, shape (n,)."""
-    turning = max(TURNING_SPEED_SHARE * scale.speed, TURNING_NOISES * speed_noise)
-    direction: Samples = np.clip(velocity / turning, -1.0, 1.0)
+    direction: Samples = np.clip(velocity / _turning_speed(scale, speed_noise), -1.0, 1.0)
     return direction
+
+
+def doubt_of_direction(velocity: Samples, scale: MotionScale, speed_noise: float, narrow: int) -> Samples:
+    """1 at rest, 0 where the part surely slides, shape (n,).
+
+    Friction that turns makes a kink in the speed, which is shifted by smoothing over `narrow` samples on
+    either side, and lies anywhere between two samples.
+    """
+    padded = np.pad(velocity, narrow, mode="edge")
+    change = np.abs(padded[2 * narrow :] - padded[: -2 * narrow])
+    shift = max(KINK_SHARE, 0.5 / narrow) * change
+    sure = np.abs(velocity) / (_turning_speed(scale, speed_noise) + shift)
+    doubt: Samples = np.maximum(1.0 - sure, 0.0)
+    return doubt
+
+
+def _turning_speed(scale: MotionScale, speed_noise: float) -> float:
+    return max(TURNING_SPEED_SHARE * scale.speed, TURNING_NOISES * speed_noise)
 
 
 def shape_grid(term: Term, scale: MotionScale) -> tuple[float, ...]:
@@ -174,6 +209,13 @@ def shape_grid(term: Term, scale: MotionScale) -> tuple[float, ...]:
         return (0.0,)
     size = scale.speed if term.shape.covariate == "speed" else scale.high - scale.low
     return tuple(share * size for share in term.shape.shares)
+
+
+def finer_grid(grid: Sequence[float], shape: float) -> tuple[float, ...]:
+    """Values between the neighbours of one on a grid."""
+    place = list(grid).index(shape)
+    low, high = grid[max(place - 1, 0)], grid[min(place + 1, len(grid) - 1)]
+    return tuple(sorted({shape, *map(float, np.geomspace(low, high, FINER))}))
 
 
 def _averaged(values: Samples, weight: Samples, centres: IndexArray) -> Samples:

@@ -163,6 +163,9 @@ REASONS: Final[Patterns] = (
     (r"no term does better in block after block that it was not fitted to",
      "kein Term ist in einem Block um den anderen besser, der nicht angepasst wurde"),
     (r"no term closes a fifth of the gap", "kein Term schließt ein Fünftel der Abweichung"),
+    (r"a force recorded late or early by less than a sample would explain as much as the best term",
+     ("eine um weniger als einen Abtastschritt zu spät oder zu früh aufgezeichnete Kraft würde ebenso viel "
+      "erklären wie der beste Term")),
     (r"no term stands out from what all of them close together",
      "kein Term hebt sich von dem ab, was alle zusammen schließen"),
     (r"the shape of the best term came to the end of its range",

@@ -183,9 +183,8 @@ def _simulation(finding: MachineFinding, errors: tuple[OpenLoopError, OpenLoopEr
 def _effect(finding: MachineFinding, term: ChosenTerm) -> dict[str, Any]:
     name = term.choice.name
     fall = finding.falls[name]
-    trial = next(
-        step.accepted for step in finding.steps if step.accepted is not None and step.accepted.term == term
-    )
+    trials = (step.accepted for step in finding.steps if step.accepted is not None)
+    trial = next(trial for trial in trials if trial.term.choice == term.choice)
     document = {
         "effect": term.choice.identifier,
         "tied_with": list(finding.tied_with[name]),

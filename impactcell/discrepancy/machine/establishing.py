@@ -1,0 +1,127 @@
+"""What is established: terms selected on training blocks, and proved on held-out ones."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from impactcell.discrepancy.machine.base_model import TermChoice
+from impactcell.discrepancy.machine.delay import delay_note, explained_by_delay, told_from_delay
+from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
+from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine
+from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
+from impactcell.discrepancy.machine.regression import Blocks
+from impactcell.discrepancy.machine.remainder import remainder_of
+from impactcell.discrepancy.machine.selection import SelectionStep, select_terms
+from impactcell.discrepancy.machine.ties import still_tied
+from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch
+from impactcell.discrepancy.machine.weak_form import Column
+
+WEIGHINGS = 2
+"""Rounds of weights by what a model leaves, and of a model by these weights [1]."""
+
+
+def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
+    """Select on training blocks, prove on held-out ones.
+
+    The rows are weighed by what the base model leaves of them while terms are looked for; what is found is
+    proved once more with weights by its own remainder, so that gaps before and after have the same ones.
+    """
+    base_terms = tuple(ChosenTerm(choice, fits.shapes[choice.name][0]) for choice in fits.base.terms)
+    for _ in range(WEIGHINGS):
+        base_terms = fits.with_best_shapes(base_terms)
+        fits.weigh(fits.fit(base_terms, settle=True))
+    training, held_out = fits.blocks()
+    steps: list[SelectionStep] = []
+    candidates: list[TermChoice] = []
+    enough = MachineFinding.enough(training, held_out)
+    if enough:
+        candidates = [
+            choice for choice in fits.candidates if not _is_like_the_machine(fits, training, choice)
+        ]
+        notes = [*notes, *alike_note(fits.candidates, candidates)]
+        search = _search(fits, training, candidates)
+        steps = select_terms(search, fits.columns(base_terms))
+        if fits.base.delay_s.is_held:
+            sample_s = max(record.finer * record.step_s for record in fits.records)
+            steps = told_from_delay(search, fits.columns(base_terms), steps, sample_s)
+        notes += [step.note for step in steps if step.note]
+    proposed = [step.accepted.term for step in steps if step.accepted is not None]
+    models, falls = _prove(fits, base_terms, proposed, seed)
+    for _ in range(WEIGHINGS if falls else 0):
+        fits.weigh(models[-1])
+        models, falls = _prove(
+            fits, base_terms, [term for term in proposed if term.choice.name in falls], seed
+        )
+    training, held_out = fits.blocks()
+    if falls:
+        steps = _with_ties_of_now(_search(fits, training, candidates), fits.columns(base_terms), steps)
+    nominal, final = models[0], models[-1]
+    if falls and not fits.base.delay_s.is_held:
+        final = fits.fit(final.terms, settle=True)
+    if enough and fits.base.delay_s.is_held:
+        search = _search(fits, training, ())
+        notes = [*notes, *delay_note(explained_by_delay(search, fits.columns(final.terms)))]
+    return MachineFinding(
+        base=fits.base,
+        records=fits.records,
+        steps=tuple(steps),
+        established=tuple(falls),
+        unconfirmed=tuple(term.choice.name for term in proposed if term.choice.name not in falls),
+        falls=falls,
+        nominal=nominal,
+        final=final,
+        training=training,
+        held_out=held_out,
+        train_gaps=(gap(training, nominal), gap(training, models[-1])),
+        expected=expected_gap(held_out, models[-1]),
+        fall=fall_of_gap(held_out, nominal, models[-1], seed),
+        held_spans=fits.held_spans(),
+        remainder=remainder_of(fits.rows(), final, fits.records),
+        block_s=fits.block_s,
+        scale=fits.scale,
+        notes=tuple(notes),
+        seed=seed,
+    )
+
+
+def _search(fits: MachineFits, training: Blocks, candidates: Sequence[TermChoice]) -> TermSearch:
+    return TermSearch(training, candidates, fits.shapes, fits.priors, fits.nonnegative)
+
+
+def _prove(
+    fits: MachineFits, base_terms: tuple[ChosenTerm, ...], proposed: Sequence[ChosenTerm], seed: int
+) -> tuple[list[FittedModel], dict[str, FallOfGap]]:
+    """Models with no, one and two of the terms proposed, as far as the held-out gap falls with each."""
+    terms = (*base_terms, *proposed)
+    for place in range(len(base_terms), len(terms)):
+        terms = fits.with_shape_refined(terms, place)
+    _, held_out = fits.blocks()
+    models, falls = [fits.fit(base_terms, settle=False)], dict[str, FallOfGap]()
+    for count in range(len(base_terms) + 1, len(terms) + 1):
+        after = fits.fit(terms[:count], settle=False)
+        fall = fall_of_gap(held_out, models[-1], after, seed)
+        if not fall.is_real:
+            break
+        models.append(after)
+        falls[terms[count - 1].choice.name] = fall
+    return models, falls
+
+
+def _with_ties_of_now(
+    search: TermSearch, columns: list[Column], steps: Sequence[SelectionStep]
+) -> list[SelectionStep]:
+    """Tell ties by weights of what the terms leave, and no more of what the base model left."""
+    told = []
+    for step in steps:
+        best, tied = step.accepted, step.tied_with
+        if best is not None and tied:
+            tied = still_tied(search, columns, best, tied)
+        told.append(replace(step, tied_with=tied))
+        columns = [*columns, *(best.term.columns if best is not None else ())]
+    return told
+
+
+def _is_like_the_machine(fits: MachineFits, training: Blocks, choice: TermChoice) -> bool:
+    """Whether a candidate at every value of its shape looks like inertia, gravity or drive."""
+    terms = [ChosenTerm(choice, shape) for shape in fits.shapes[choice.name]]
+    return all(like_the_machine(training, term) for term in terms)

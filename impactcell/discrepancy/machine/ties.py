@@ -1,0 +1,47 @@
+"""Terms that the records cannot tell from the best one."""
+
+from collections.abc import Sequence
+
+from impactcell.discrepancy.machine.trials import TermSearch, Trial, mean_over_error
+from impactcell.discrepancy.machine.weak_form import Column
+from impactcell.records import Samples
+
+TIE_Z = 2.2
+"""Difference of two terms over its standard error up to which they are tied [1]."""
+MIN_TIED_SHARE = 0.8
+"""Share of the best term's gain below which another one is not tied whatever the scatter [1]."""
+EQUAL_SHARE = 0.97
+"""Share of the best term's gain from which on another one is tied whatever the scatter [1]."""
+MAX_FLOOR = 1.3
+"""Gap in noise floors up to which a model leaves nothing, as in the workflow of shots [1]."""
+TOLD_GAP = 2.0
+"""Noise floors from which on a term that leaves as much is no equal of one that leaves nothing [1]."""
+
+
+def tied_terms(search: TermSearch, before: Samples, best: Trial, others: Sequence[Trial]) -> tuple[str, ...]:
+    """Names of the terms that are tied with the best one.
+
+    Where the best one takes the gap to its floor, none is that leaves one, however small a share it is.
+    """
+    alike = [trial for trial in others if is_tied(best, trial)]
+    if search.gap_of(before - best.gains) <= MAX_FLOOR:
+        alike = [trial for trial in alike if search.gap_of(before - trial.gains) <= TOLD_GAP]
+    return tuple(trial.term.choice.name for trial in alike)
+
+
+def still_tied(
+    search: TermSearch, columns: Sequence[Column], best: Trial, names: Sequence[str]
+) -> tuple[str, ...]:
+    """Names of those tied with the best term that still are, by the blocks of another search."""
+    before = search.losses(columns)
+    choices = [choice for choice in search.candidates if choice.name in names]
+    now = search.best_shape(best.term.choice, columns, before)
+    return tied_terms(search, before, now, [search.best_shape(one, columns, before) for one in choices])
+
+
+def is_tied(best: Trial, rival: Trial) -> bool:
+    """Whether the blocks cannot tell a term that does worse from the best one."""
+    if rival.gain < MIN_TIED_SHARE * best.gain or rival.at_end:
+        return False
+    apart = mean_over_error(best.gains - rival.gains), mean_over_error(best.shares - rival.shares)
+    return rival.gain >= EQUAL_SHARE * best.gain or max(apart) < TIE_Z
