@@ -8,7 +8,7 @@ import numpy as np
 
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
-from impactcell.discrepancy.machine.channel_values import LARGEST, held_mean, without_spikes
+from impactcell.discrepancy.machine.channel_values import LARGEST, cleaned_position, held_mean, without_spikes
 from impactcell.discrepancy.machine.smoothing import smoothed_acceleration, speed_noise
 from impactcell.errors import CampaignError
 from impactcell.features import drive_noise_std, is_command, white_noise_std
@@ -149,7 +149,7 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         )
     time = begin + step * np.arange(count)
     is_held = len(channels) > 1 and base.response is Response.POSITION and is_command(channels[1].values)
-    cleaned = [without_spikes(channel.values) for channel in channels]
+    cleaned = [cleaned_position(shot.position.values), *(without_spikes(one.values) for one in channels[1:])]
     values = [
         np.interp(time, channel.time_s, clean) for channel, (clean, _) in zip(channels, cleaned, strict=True)
     ]
