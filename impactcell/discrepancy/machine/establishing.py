@@ -56,8 +56,11 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
     if falls:
         steps = _with_ties_of_now(_search(fits, training, candidates), fits.columns(base_terms), steps)
     nominal, final = models[0], models[-1]
+    settled = training, held_out
     if falls and not fits.base.delay_s.is_held:
+        # Blocks are linear in the delay about that of the base model, which took over what the terms explain.
         final = fits.fit(final.terms, settle=True)
+        settled = fits.blocks()
     if enough and fits.base.delay_s.is_held:
         search = _search(fits, training, ())
         notes = [*notes, *delay_note(explained_by_delay(search, fits.columns(final.terms)))]
@@ -72,9 +75,9 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
         final=final,
         training=training,
         held_out=held_out,
-        train_gaps=(gap(training, nominal), gap(training, models[-1])),
-        expected=expected_gap(held_out, models[-1]),
-        fall=fall_of_gap(held_out, nominal, models[-1], seed),
+        train_gaps=(gap(training, nominal), gap(settled[0], final)),
+        expected=expected_gap(settled[1], final),
+        fall=fall_of_gap(held_out, nominal, final, seed, settled[1]),
         held_spans=fits.held_spans(),
         remainder=remainder_of(fits.rows(), final, fits.records),
         block_s=fits.block_s,

@@ -228,7 +228,13 @@ class MachineFits:
             self.delay_s = float(np.clip(nearer, self.delay_s - apart, self.delay_s + apart))
 
     def weigh(self, model: FittedModel) -> None:
-        """Weigh rows by how surely they know the direction of friction, by what a model leaves."""
+        """Weigh rows by how surely they know the direction of friction, by what a model leaves.
+
+        Where the delay is free, by what it leaves at its own; the delay that blocks are built at stays.
+        """
+        built_at = self.gravity, self.delay_s
+        if not self.base.delay_s.is_held:
+            self._settle(model.terms)
         own = [term for term in model.terms if not term_of(term.choice).is_friction]
         for _ in range(WEIGHINGS):
             training, _ = self.blocks()
@@ -239,6 +245,8 @@ class MachineFits:
             friction = float(level.coefficients[-1])
             chosen = np.isin(self._number(rows), training.number)
             self.doubt = DirectionDoubt(friction, floors_left(rows, residual, chosen, friction))
+        self.gravity, self.delay_s = built_at
+        self._set_priors()
 
     def with_best_shapes(self, terms: tuple[ChosenTerm, ...]) -> tuple[ChosenTerm, ...]:
         """Give each term the shape of least squares, on its grid and between, one after the other."""

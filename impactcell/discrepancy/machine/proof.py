@@ -29,10 +29,19 @@ def gap(blocks: Blocks, model: FittedModel) -> float:
     return math.sqrt(float(losses.sum()) / max(float(blocks.noise.sum()), 1e-300))
 
 
-def fall_of_gap(blocks: Blocks, before: FittedModel, after: FittedModel, seed: int) -> FallOfGap:
-    """How the held-out gap falls from one model to the next, blocks drawn with replacement."""
-    losses = [blocks.losses(model.fit.columns, model.fit.coefficients) for model in (before, after)]
-    gap_before, gap_after = gap(blocks, before), gap(blocks, after)
+def fall_of_gap(
+    blocks: Blocks, before: FittedModel, after: FittedModel, seed: int, blocks_after: Blocks | None = None
+) -> FallOfGap:
+    """How the held-out gap falls from one model to the next, blocks drawn with replacement.
+
+    `blocks_after`: the same blocks at the delay and gravity that were found with the second model.
+    """
+    now = blocks if blocks_after is None else blocks_after
+    losses = [
+        one.losses(model.fit.columns, model.fit.coefficients)
+        for one, model in ((blocks, before), (now, after))
+    ]
+    gap_before, gap_after = gap(blocks, before), gap(now, after)
     closed = low = high = math.nan
     if gap_before > MIN_OPEN_GAP:
         closed = (gap_before - gap_after) / (gap_before - 1.0)
