@@ -9,7 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from impactcell.discrepancy.machine import MachineFinding, TermChoice, investigate_machine, smoothing
+from impactcell.discrepancy.machine import (
+    MachineFinding,
+    NumberPrior,
+    TermChoice,
+    investigate_machine,
+    smoothing,
+)
 from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, weighed
 from impactcell.discrepancy.machine.weak_form import KINK_SHARE, Rows
 from impactcell.records import Samples
@@ -87,6 +93,16 @@ def test_what_is_hidden_beside_reversals_is_found_and_nothing_remains() -> None:
     assert finding.fall.before > 10.0
     assert finding.fall.after < finding.expected[1]
     assert value_of(finding, "quadratic_drag") == pytest.approx(6.0, rel=0.02)
+
+
+def test_nothing_remains_beside_a_free_delay_either() -> None:
+    """Without viscous friction the delay takes over what it can of it; with it, it goes back to none."""
+    knows_less = replace(SLIDE, terms=SLIDE.terms[:1], delay_s=NumberPrior(0.0, 5e-3))
+    finding = investigate_machine(slides(lambda rng: sines(4.0, rng), QUIET), knows_less)
+    assert finding.established == ("viscous_friction",)
+    assert abs(finding.nominal.delay_s) > 4e-3
+    assert abs(finding.final.delay_s) < 5e-5
+    assert finding.fall.after < finding.expected[1]
 
 
 def test_a_stribeck_speed_is_found_between_the_points_of_its_grid() -> None:

@@ -11,9 +11,10 @@ from impactcell.discrepancy.machine.finding import (
 from impactcell.discrepancy.machine.held_out_stretch import drifts
 from impactcell.discrepancy.machine.investigation import investigate_machine
 from impactcell.discrepancy.machine.law_terms import LAW_PLACES, term_of
+from impactcell.discrepancy.machine.model_forces import motions
 from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, VALUES
 from impactcell.discrepancy.machine.selection import SelectionStep
-from impactcell.discrepancy.machine.simulation import motions, simulate_held_out
+from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE, Term
 from impactcell.discrepancy.machine.trials import ChosenTerm, Trial
 from impactcell.discrepancy.machine.weak_form import ECCENTRICITY

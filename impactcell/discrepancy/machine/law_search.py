@@ -16,6 +16,7 @@ from impactcell.discrepancy.machine.finding import MAX_EXPECTED_GAP, FittedModel
 from impactcell.discrepancy.machine.free_splines import best_spline, spline_function, tangent_of, with_spline
 from impactcell.discrepancy.machine.law_terms import LAW_PREFIX, term_of
 from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.model_forces import resistance
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
 from impactcell.discrepancy.machine.regression import (
     Blocks,
@@ -24,7 +25,7 @@ from impactcell.discrepancy.machine.regression import (
 )
 from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, SPLINE_PIECES, splines
 from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, MIN_SHARE_OF_FREE
-from impactcell.discrepancy.machine.simulation import resistance, simulate_held_out
+from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.ties import TIE_Z
 from impactcell.discrepancy.machine.trials import ChosenTerm, mean_over_error
 from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, Column

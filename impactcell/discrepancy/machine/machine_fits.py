@@ -10,14 +10,10 @@ import numpy as np
 
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, TermChoice
 from impactcell.discrepancy.machine.delay import DELAY
-from impactcell.discrepancy.machine.direction_doubt import (
-    DirectionDoubt,
-    floors_left,
-    residual_of,
-    weighed,
-)
+from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, residual_of, weighed
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.law_terms import term_of
+from impactcell.discrepancy.machine.model_forces import friction_at_rest
 from impactcell.discrepancy.machine.regression import (
     BLOCKS_OF_RECORD,
     PIECES_PER_BLOCK,
@@ -242,7 +238,8 @@ class MachineFits:
             fit = fit_blocks(training, self.columns(model.terms), self.priors, self.nonnegative)
             rows = self._rows(self.gravity, self.delay_s)
             residual = residual_of(rows, fit.columns, fit.coefficients)
-            friction = float(level.coefficients[-1])
+            at_rest = friction_at_rest(replace(model, fit=fit), self.records, self.scale)
+            friction = max(float(level.coefficients[-1]), at_rest)
             chosen = np.isin(self._number(rows), training.number)
             self.doubt = DirectionDoubt(friction, floors_left(rows, residual, chosen, friction))
         self.gravity, self.delay_s = built_at

@@ -6,7 +6,7 @@ both forces are averaged as the regression averages.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -21,10 +21,9 @@ from impactcell.discrepancy.machine.held_out_stretch import (
     first_state,
     settled_start,
 )
-from impactcell.discrepancy.machine.law_terms import term_of
+from impactcell.discrepancy.machine.model_forces import law_of
 from impactcell.discrepancy.machine.regression import PRIOR_REACH
 from impactcell.discrepancy.machine.smoothing import averaged, smoothed_acceleration, smoothed_speed
-from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.uniform_records import (
     MotionScale,
     UniformRecord,
@@ -86,7 +85,7 @@ def needed_force(model: FittedModel, record: UniformRecord, stretch: slice, scal
         term.choice.covariate: np.full(velocity.shape, record.covariates.get(term.choice.covariate, 0.0))
         for term in model.terms
     }
-    smooth, friction = _law(model, covariates)(record.position, velocity, load)
+    smooth, friction = law_of(model, covariates)(record.position, velocity, load)
     gain = 1.0 + model.nuisance("force_gain")
     gravity = gain * model.base.gravity_torque.value * np.sin(record.position)
     beyond, by_zero = _gravity_deviation(model)
@@ -179,7 +178,7 @@ def _runner(
     drive = drive * (1.0 + model.nuisance("force_gain")) + model.nuisance("force_offset")
     inertia = np.array([record.inertia for record in records]) * (1.0 + model.nuisance("inertia"))
     columns = {term.choice.covariate for term in model.terms}
-    law = _law(
+    law = law_of(
         model, {name: np.array([record.covariates.get(name, 0.0) for record in records]) for name in columns}
     )
     beyond, by_zero = _gravity_deviation(model)
@@ -218,69 +217,6 @@ def _runner(
         return out
 
     return run
-
-
-def _law(
-    model: FittedModel, covariates: Mapping[str, Samples]
-) -> Callable[[Samples, Samples, Samples], list[Samples]]:
-    """Sum of all smooth forces, and level of friction, of position, velocity and load: shape (n,) each."""
-    parts = [
-        (
-            term_of(chosen.choice),
-            chosen,
-            np.array([model.value(column) for column in chosen.columns]),
-            covariates[chosen.choice.covariate],
-        )
-        for chosen in model.terms
-    ]
-
-    def law(position: Samples, velocity: Samples, load: Samples) -> list[Samples]:
-        sums = [np.zeros(position.shape), np.zeros(position.shape)]
-        for term, chosen, strengths, covariate in parts:
-            features = term.features(MotionState(position, velocity, load, covariate), chosen.shape)
-            sums[term.is_friction] += strengths @ features
-        return sums
-
-    return law
-
-
-def motions(finding: MachineFinding) -> list[MotionState]:
-    """Measured motion of every record, by the final model's gravity; without any column of `shots.csv`."""
-    states = []
-    for record in finding.records:
-        _, narrow = half_supports(record, finding.scale)
-        velocity, _ = smoothed_speed(record.position, narrow, record.step_s)
-        gravity = finding.final.gravity
-        load = carried_load(finding.base.response, record, record.force, (gravity, finding.scale))
-        states.append(MotionState(record.position, velocity, load, np.zeros(velocity.shape)))
-    return states
-
-
-def resistance(finding: MachineFinding, model: FittedModel) -> tuple[float, float]:
-    """Least and largest force against the motion over all records, by the terms that may not give energy.
-
-    Terms of friction count, and those whose strength may not be negative; springs and waves of force do not.
-    """
-    least, largest = math.inf, 0.0
-    for record, motion in zip(finding.records, motions(finding), strict=True):
-        _, narrow = half_supports(record, finding.scale)
-        noise = smoothed_speed(record.position, narrow, record.step_s)[1] * record.noise[0]
-        moving = np.abs(direction_of_motion(motion.velocity, finding.scale, noise)) == 1.0
-        against = np.zeros(record.position.shape)
-        for chosen in model.terms:
-            term = term_of(chosen.choice)
-            column = np.full(moving.shape, record.covariates.get(chosen.choice.covariate, 0.0))
-            features = term.features(replace(motion, covariate=column), chosen.shape)
-            if term.is_friction or term.nonnegative:
-                sense = 1.0 if term.is_friction else -np.sign(motion.velocity)
-                against += sense * sum(
-                    model.value(name) * feature
-                    for name, feature in zip(chosen.columns, features, strict=True)
-                )
-        if moving.any():
-            least = min(least, float(against[moving].min()))
-            largest = max(largest, float(against[moving].max()))
-    return least, largest
 
 
 def _gravity_deviation(model: FittedModel) -> tuple[float, float]:

@@ -1,0 +1,98 @@
+"""Forces of a fitted model by the state of the machine: anywhere, at rest, and where it was measured."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
+from impactcell.discrepancy.machine.law_terms import term_of
+from impactcell.discrepancy.machine.smoothing import smoothed_speed
+from impactcell.discrepancy.machine.terms import MotionState
+from impactcell.discrepancy.machine.uniform_records import (
+    MotionScale,
+    UniformRecord,
+    carried_load,
+    half_supports,
+)
+from impactcell.discrepancy.machine.weak_form import direction_of_motion
+from impactcell.records import Samples
+
+
+def law_of(
+    model: FittedModel, covariates: Mapping[str, Samples]
+) -> Callable[[Samples, Samples, Samples], list[Samples]]:
+    """Sum of all smooth forces, and level of friction, of position, velocity and load: shape (n,) each."""
+    parts = [
+        (
+            term_of(chosen.choice),
+            chosen,
+            np.array([model.value(column) for column in chosen.columns]),
+            covariates[chosen.choice.covariate],
+        )
+        for chosen in model.terms
+    ]
+
+    def law(position: Samples, velocity: Samples, load: Samples) -> list[Samples]:
+        sums = [np.zeros(position.shape), np.zeros(position.shape)]
+        for term, chosen, strengths, covariate in parts:
+            features = term.features(MotionState(position, velocity, load, covariate), chosen.shape)
+            sums[term.is_friction] += strengths @ features
+        return sums
+
+    return law
+
+
+def friction_at_rest(model: FittedModel, records: Sequence[UniformRecord], scale: MotionScale) -> float:
+    """Mean level of a model's friction where the part would rest, over all places of all records."""
+    levels = []
+    for record in records:
+        still = np.zeros(record.position.shape)
+        load = carried_load(model.base.response, record, record.force, (model.gravity, scale))
+        columns = {
+            term.choice.covariate: still + record.covariates.get(term.choice.covariate, 0.0)
+            for term in model.terms
+        }
+        _, friction = law_of(model, columns)(record.position, still, load)
+        levels.append(float(friction.mean()))
+    return float(np.mean(levels))
+
+
+def motions(finding: MachineFinding) -> list[MotionState]:
+    """Measured motion of every record, by the final model's gravity; without any column of `shots.csv`."""
+    states = []
+    for record in finding.records:
+        _, narrow = half_supports(record, finding.scale)
+        velocity, _ = smoothed_speed(record.position, narrow, record.step_s)
+        gravity = finding.final.gravity
+        load = carried_load(finding.base.response, record, record.force, (gravity, finding.scale))
+        states.append(MotionState(record.position, velocity, load, np.zeros(velocity.shape)))
+    return states
+
+
+def resistance(finding: MachineFinding, model: FittedModel) -> tuple[float, float]:
+    """Least and largest force against the motion over all records, by the terms that may not give energy.
+
+    Terms of friction count, and those whose strength may not be negative; springs and waves of force do not.
+    """
+    least, largest = math.inf, 0.0
+    for record, motion in zip(finding.records, motions(finding), strict=True):
+        _, narrow = half_supports(record, finding.scale)
+        noise = smoothed_speed(record.position, narrow, record.step_s)[1] * record.noise[0]
+        moving = np.abs(direction_of_motion(motion.velocity, finding.scale, noise)) == 1.0
+        against = np.zeros(record.position.shape)
+        for chosen in model.terms:
+            term = term_of(chosen.choice)
+            column = np.full(moving.shape, record.covariates.get(chosen.choice.covariate, 0.0))
+            features = term.features(replace(motion, covariate=column), chosen.shape)
+            if term.is_friction or term.nonnegative:
+                sense = 1.0 if term.is_friction else -np.sign(motion.velocity)
+                against += sense * sum(
+                    model.value(name) * feature
+                    for name, feature in zip(chosen.columns, features, strict=True)
+                )
+        if moving.any():
+            least = min(least, float(against[moving].min()))
+            largest = max(largest, float(against[moving].max()))
+    return least, largest
