@@ -1,6 +1,7 @@
 """Where a part turns or rests no row knows which way friction acts: that is no gap of the model."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,8 @@ from impactcell.discrepancy.machine import (
 )
 from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, weighed
 from impactcell.discrepancy.machine.weak_form import KINK_SHARE, Rows
+from impactcell.discrepancy.report import german_machine_sentences
+from impactcell.discrepancy.report.machine_sentences import headline
 from impactcell.records import Samples
 from tests.discrepancy.stick_slip import (
     COULOMB_N,
@@ -76,6 +79,21 @@ def test_a_drive_of_levels_has_no_gap() -> None:
     finding = investigate_machine(slides(lambda rng: levels(8.0, 0.4, rng), (0.0, 1e-5)), SLIDE)
     assert finding.verdict == "no_gap"
     assert value_of(finding, "viscous_friction") == pytest.approx(VISCOUS_N_S_PER_M, rel=2e-3)
+
+
+def test_what_a_delay_would_explain_is_said_first() -> None:
+    """A measured force jumps anywhere between two samples: half a sample early, on the mean."""
+    records = slides(lambda rng: levels(8.0, 0.4, rng), (0.05, 1e-5))
+    finding = investigate_machine(records, SLIDE)
+    assert finding.verdict == "unknown"
+    assert re.search(
+        r": a force recorded [12](\.\d)? ms early would explain [89]\d % of it\.", headline(finding)
+    )
+    german = german_machine_sentences.headline(finding)
+    assert re.search(r"[12](,\d)? ms zu früh aufgezeichnete Kraft erklärte [89]\d % davon", german)
+    free = investigate_machine(records, replace(SLIDE, delay_s=NumberPrior(0.0, 5e-3)))
+    assert free.verdict == "no_gap"
+    assert free.final.delay_s == pytest.approx(-2e-3, rel=0.1)
 
 
 def test_few_samples_in_a_period_have_no_gap() -> None:

@@ -12,6 +12,8 @@ from impactcell.discrepancy.machine.weak_form import Column
 DELAY: Column = ("delay_s", 0.0, 0)
 """Column of how late the force was recorded: the force's derivative."""
 
+MOST = 0.5
+"""Share of what remains from which on a delay is what the headline tells [1]."""
 AS_LATE = "a force recorded late or early by less than a sample would explain as much as the best term"
 """Why the best term is not taken where the delay is not known so well."""
 
@@ -53,10 +55,21 @@ def delay_note(explained: tuple[float, float] | None) -> list[str]:
     """Say what a delay that the base model does not have would explain."""
     if explained is None:
         return []
-    delay_s, share = explained
     note = (
-        f"A force recorded {1e3 * abs(delay_s):.2g} ms {'late' if delay_s > 0.0 else 'early'} would explain "
-        f"{100.0 * share:.0f} % of what remains: delay_s among the nuisances of the base model finds the "
+        f"A{_words(explained)[1:]} of what remains: delay_s among the nuisances of the base model finds the "
         "delay with everything else."
     )
     return [note]
+
+
+def blamed_on_delay(steps: list[SelectionStep], explained: tuple[float, float] | None) -> list[SelectionStep]:
+    """Give as the reason why no term was taken a delay that would explain most of what remains."""
+    if explained is None or explained[1] < MOST or not steps or steps[0].accepted is not None:
+        return steps
+    return [replace(steps[0], reason=f"{_words(explained)} of it"), *steps[1:]]
+
+
+def _words(explained: tuple[float, float]) -> str:
+    delay_s, share = explained
+    when = "late" if delay_s > 0.0 else "early"
+    return f"a force recorded {1e3 * abs(delay_s):.2g} ms {when} would explain {100.0 * share:.0f} %"

@@ -4,7 +4,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from impactcell.discrepancy.machine.base_model import TermChoice
-from impactcell.discrepancy.machine.delay import delay_note, explained_by_delay, told_from_delay
+from impactcell.discrepancy.machine.delay import (
+    blamed_on_delay,
+    delay_note,
+    explained_by_delay,
+    told_from_delay,
+)
 from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
 from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine
 from impactcell.discrepancy.machine.machine_fits import MachineFits
@@ -63,7 +68,9 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
         settled = fits.blocks()
     if enough and fits.base.delay_s.is_held:
         search = _search(fits, training, ())
-        notes = [*notes, *delay_note(explained_by_delay(search, fits.columns(final.terms)))]
+        explained = explained_by_delay(search, fits.columns(final.terms))
+        notes = [*notes, *delay_note(explained)]
+        steps = blamed_on_delay(steps, explained)
     return MachineFinding(
         base=fits.base,
         records=fits.records,

@@ -166,6 +166,9 @@ REASONS: Final[Patterns] = (
     (r"a force recorded late or early by less than a sample would explain as much as the best term",
      ("eine um weniger als einen Abtastschritt zu spät oder zu früh aufgezeichnete Kraft würde ebenso viel "
       "erklären wie der beste Term")),
+    (r"a force recorded (\S+) ms (late|early) would explain (\d+) % of it",
+     lambda m: f"eine um {m[1]} ms zu {'spät' if m[2] == 'late' else 'früh'} aufgezeichnete Kraft erklärte "
+     f"{m[3]} % davon"),
     (r"no term stands out from what all of them close together",
      "kein Term hebt sich von dem ab, was alle zusammen schließen"),
     (r"the shape of the best term came to the end of its range",
