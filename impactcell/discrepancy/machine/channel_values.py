@@ -15,7 +15,6 @@ MIN_SPIKE_SHARE = 0.05
 """And by at least this share of the channel's range [1]."""
 MAX_SPIKE_SAMPLES = 2
 """Samples in a row that are a spike, as where data are inspected: the pushes of a controller last longer."""
-
 USUAL_SHARE, USUAL_NOISES = 0.9, 1.645
 """Share of the samples by which a motion's usual roughness is told, and in how many deviations it lies."""
 MAX_FAR_SHARE = 0.05
@@ -70,13 +69,13 @@ def without_outliers(position: Samples) -> tuple[Samples, int]:
     for place in far[np.argsort(-roughness[far])]:
         first = max(place - ABOUT, 0)
         near = values[first : place + ABOUT + 1]
-        rough = float(np.abs(_roughness(near)).max())
-        if abs(_roughness(near)[place - first]) <= SPIKE_FACTOR * usual:
+        rough = np.abs(_roughness(near))
+        if rough[place - first] <= SPIKE_FACTOR * usual:
             continue
         for other in (0, 1, -1, 2, -2, 3, -3):
             faulty = np.unique(np.clip([place - first, place - first + other], 0, len(near) - 1))
             filled = _filled(near, faulty)
-            if np.abs(_roughness(filled)).max() <= KINK_LEFT * rough:
+            if np.abs(_roughness(filled)).max() <= KINK_LEFT * rough.max():
                 values[first : place + ABOUT + 1] = filled
                 replaced += len(faulty)
                 break

@@ -11,7 +11,6 @@ from impactcell.discrepancy.machine.weak_form import Column
 
 DELAY: Column = ("delay_s", 0.0, 0)
 """Column of how late the force was recorded: the force's derivative."""
-
 MOST = 0.5
 """Share of what remains from which on a delay is what the headline tells [1]."""
 AS_LATE = "a force recorded late or early by less than a sample would explain as much as the best term"
@@ -28,8 +27,7 @@ def explained_by_delay(search: TermSearch, columns: Sequence[Column]) -> tuple[f
     excess = float(before.sum() - search.blocks.noise.sum())
     if not (mean_over_error(gains) >= MIN_GAIN_Z and gains.sum() >= MIN_SHARE * excess > 0.0):
         return None
-    fit = fit_blocks(search.blocks, [*columns, DELAY], search.priors, search.nonnegative)
-    return float(fit.coefficients[-1]), min(float(gains.sum()) / excess, 1.0)
+    return _fitted_delay(search, columns), min(float(gains.sum()) / excess, 1.0)
 
 
 def told_from_delay(
@@ -45,10 +43,15 @@ def told_from_delay(
     as_well = float(gains.sum()) >= MIN_TIED_SHARE * best.gain and mean_over_error(best.gains - gains) < TIE_Z
     if not as_well or mean_over_error(gains) < MIN_GAIN_Z:
         return steps
-    fit = fit_blocks(search.blocks, [*columns, DELAY], search.priors, search.nonnegative)
-    if abs(float(fit.coefficients[-1])) > sample_s:
+    if abs(_fitted_delay(search, columns)) > sample_s:
         return steps
     return [replace(steps[0], accepted=None, tied_with=(), reason=AS_LATE)]
+
+
+def _fitted_delay(search: TermSearch, columns: Sequence[Column]) -> float:
+    """Delay of least squares beside a model's columns [s]."""
+    fit = fit_blocks(search.blocks, [*columns, DELAY], search.priors, search.nonnegative)
+    return float(fit.coefficients[-1])
 
 
 def delay_note(explained: tuple[float, float] | None) -> list[str]:

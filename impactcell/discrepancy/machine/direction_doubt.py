@@ -5,7 +5,6 @@ a sample or so: a row over such a place errs by a share of the friction, however
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -68,16 +67,6 @@ def floors_left(rows: Rows, residual: Samples, chosen: np.ndarray, friction: flo
         return 1.0
     most = math.log(MOST_FLOORS)
     return math.exp(brentq(excess, 0.0, most)) if excess(most) < 0.0 else MOST_FLOORS
-
-
-def residual_of(rows: Rows, columns: Sequence[tuple[str, float, int]], coefficients: Samples) -> Samples:
-    """Give what a model leaves of each row, shape (n,)."""
-    explained = sum(
-        (value * rows.columns[column] for column, value in zip(columns, coefficients, strict=True)),
-        np.zeros(rows.target.shape),
-    )
-    left: Samples = rows.target - explained
-    return left
 
 
 def _doubt(rows: Rows, friction: float) -> Samples:

@@ -10,7 +10,7 @@ import numpy as np
 
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, TermChoice
 from impactcell.discrepancy.machine.delay import DELAY
-from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, residual_of, weighed
+from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, weighed
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.model_forces import friction_at_rest
@@ -32,6 +32,7 @@ from impactcell.discrepancy.machine.weak_form import (
     Rows,
     build_rows,
     finer_grid,
+    residual_of,
     shape_grid,
 )
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
 from impactcell.discrepancy.machine.law_terms import term_of
-from impactcell.discrepancy.machine.smoothing import smoothed_speed
+from impactcell.discrepancy.machine.smoothing import smoothed_speed, speed_noise
 from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.uniform_records import (
     MotionScale,
@@ -79,7 +79,7 @@ def resistance(finding: MachineFinding, model: FittedModel) -> tuple[float, floa
     least, largest = math.inf, 0.0
     for record, motion in zip(finding.records, motions(finding), strict=True):
         _, narrow = half_supports(record, finding.scale)
-        noise = smoothed_speed(record.position, narrow, record.step_s)[1] * record.noise[0]
+        noise = speed_noise(narrow, record.step_s) * record.noise[0]
         moving = np.abs(direction_of_motion(motion.velocity, finding.scale, noise)) == 1.0
         against = np.zeros(record.position.shape)
         for chosen in model.terms:

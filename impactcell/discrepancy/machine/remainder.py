@@ -5,10 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from impactcell.discrepancy.machine.direction_doubt import residual_of
 from impactcell.discrepancy.machine.finding import FittedModel, Remainder
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
-from impactcell.discrepancy.machine.weak_form import Rows
+from impactcell.discrepancy.machine.weak_form import Rows, residual_of
 from impactcell.records import Samples
 
 MOST = 0.5

@@ -174,6 +174,16 @@ def _record_rows(
     )
 
 
+def residual_of(rows: Rows, columns: Sequence[Column], coefficients: Samples) -> Samples:
+    """Give what a model leaves of each row, shape (n,)."""
+    explained = sum(
+        (value * rows.columns[column] for column, value in zip(columns, coefficients, strict=True)),
+        np.zeros(rows.target.shape),
+    )
+    left: Samples = rows.target - explained
+    return left
+
+
 def eccentricity_waves(position: Samples) -> Samples:
     """Return what an encoder off its centre reads beside the angle, per unit of e_c and e_s: (2, n)."""
     return np.stack([np.cos(position), np.sin(position)])
