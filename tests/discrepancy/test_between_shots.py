@@ -9,6 +9,8 @@ from scipy import stats
 
 from impactcell.discrepancy.model import ParameterEstimate
 from impactcell.discrepancy.search import between_shots, chance_by_exchange, chance_of_narrowing, trace_rivals
+from impactcell.discrepancy.workflow import investigate
+from tests.discrepancy.study import Job, campaign
 
 
 @pytest.mark.parametrize("parameters", [1, 3])
@@ -90,6 +92,31 @@ def test_a_name_between_shots_gives_way_to_what_narrows_the_factors_within_them(
 ) -> None:
     fitted: Any = SimpleNamespace(effects=("viscous_friction", rival), spread=spread)
     assert trace_rivals(0.02, [fitted], 30) == ((rival,) if tied else (), explains)
+
+
+@pytest.mark.parametrize(
+    ("spread", "tied"), [(0.02, ("surface_tilt",)), (0.018, ("surface_tilt",)), (0.03, ()), (0.01, None)]
+)
+def test_what_the_factors_speak_for_as_much_is_tied_whether_it_acts_between_shots_or_not(
+    spread: float, tied: tuple[str, ...] | None
+) -> None:
+    best: Any = SimpleNamespace(effects=("direction_asymmetry",), spread=0.02)
+    other: Any = SimpleNamespace(effects=("surface_tilt",), spread=spread)
+    assert between_shots.factor_rivals(best, [best, other], 30) == tied
+
+
+@pytest.mark.long
+def test_a_tilt_of_the_surface_is_not_called_friction_by_direction_beside_a_model_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of both the traces say nothing, so that no fit of the traces had the tilt."""
+    for later, idle in (("find_law", lambda *_: None), ("hold_against_free_forms", lambda _, found: found)):
+        monkeypatch.setattr(f"impactcell.discrepancy.workflow.{later}", idle)  # have tests of their own
+    seed, library = 720_014, ("surface_tilt", "direction_asymmetry")
+    job = Job("model_error", ("surface_tilt", "wandering_force"), seed, target=2.0, shots=40)
+    found = investigate(campaign(job, (1.1658, 0.0828)), seed=seed, library=library)
+    assert found.verdict == "tied"
+    assert {*found.selection.ties[found.added[0]], *found.added} == set(library)
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,11 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+from impactcell.discrepancy.data import decimate
+from impactcell.discrepancy.laws.free_rivals import beside_terms, with_more_pieces
 from impactcell.discrepancy.laws.scored_model import ScoredModel
 from impactcell.discrepancy.laws.standing import (
+    SAMPLES,
     FreeForms,
     fit_free_forms,
     is_in_its_place,
@@ -17,10 +20,12 @@ from impactcell.discrepancy.laws.standing import (
     outdone_by,
     stands_beside,
 )
+from impactcell.discrepancy.model import Problem, refit_shot_parameters
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.search import Outdone
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.physics.effects import LIBRARY as EFFECTS
+from impactcell.physics.free_forms import FINER
 from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
 from tests.discrepancy.study import Job, campaign, strengths
 
@@ -57,6 +62,38 @@ def test_a_force_of_which_nobody_knows_the_form_is_named_after_nothing(seed: int
     found = _investigated(("wandering_force",), (0.2,), seed)
     assert found.verdict == "unknown"
     assert found.added == ()
+
+
+def test_a_term_that_leaves_something_is_given_more_pieces_alone_and_beside_the_effect() -> None:
+    """A model error with many waves hid an adhesion: beside a curve of few pieces it left 1.13 floors."""
+    place, seed, held = "free_force_over_position", 720_023, []
+    job = Job("model_error", ("adhesion", "wandering_force"), seed, target=2.0, shots=SHOTS)
+    with (
+        patch("impactcell.discrepancy.workflow.find_law", lambda *_: None),
+        patch(
+            "impactcell.discrepancy.workflow.hold_against_free_forms",
+            lambda *given: held.append(given) or given[1],
+        ),
+    ):
+        investigate(campaign(job, (0.3097, 0.0526)), seed=seed, library=("adhesion",))
+    ((context, selection),) = held
+    problem = context.problem
+    fewer = replace(context, coarse=Problem(decimate(problem.shots, SAMPLES), problem.batches))
+    with (
+        patch("impactcell.discrepancy.laws.standing.REMAINDER_FORMS", {place: REMAINDER_FORMS[place]}),
+        patch("impactcell.discrepancy.laws.standing._fit_filter", lambda *_: None),
+        patch("impactcell.discrepancy.laws.free_rivals.REMAINDER_FORMS", {place: REMAINDER_FORMS[place]}),
+    ):
+        forms = fit_free_forms(fewer, refit_shot_parameters(fewer.coarse, selection.nominal.fit))
+        (beside,) = beside_terms(fewer, forms)
+        finer, (beside_finer,) = with_more_pieces(fewer, forms, [beside], place)
+    (alone,), (alone_finer,) = forms.alone, finer.alone
+    assert finer.terms[place].form is FINER[place]
+    assert alone_finer.place == beside_finer.place == place
+    assert alone_finer.mean_square < 0.97 * alone.mean_square
+    assert beside_finer.mean_square < 0.97 * beside.mean_square
+    assert (beside_finer.effect, beside_finer.p_value) == ("adhesion", beside.p_value)
+    assert beside_finer.is_told_from(alone_finer)
 
 
 def _leaving(mean_square: float) -> Any:

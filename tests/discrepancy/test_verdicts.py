@@ -167,6 +167,57 @@ def test_of_three_effects_each_is_asked_what_it_closes_of_what_the_others_leave(
     assert confirmed(measure, nested(nominal, **alone, ab=whole, ac=whole, bc=whole, abc=whole)) == {}
 
 
+def leaving(found: DiscrepancyResult, trace: float) -> Any:
+    """A model that leaves a held-out gap of so many noise floors in the traces."""
+    whole = found.held_final
+    return replace(whole, residual=trace / measure_of(found).gap(whole).trace * whole.residual)
+
+
+@pytest.mark.parametrize(("without", "named"), [(1.1, ["a"]), (1.3, ["a", "b"])])
+def test_an_effect_beside_another_has_a_name_only_where_that_leaves_more_than_a_machine_does(
+    viscous: DiscrepancyResult, without: float, named: list[str]
+) -> None:
+    """A wave was named beside Stribeck friction for a model error of half a noise floor."""
+    measure, nominal = measure_of(viscous), leaving(viscous, 4.0)
+    first, both = leaving(viscous, without), leaving(viscous, 1.0)
+    assert measure.change(first, both).is_real()
+    assert list(confirmed(measure, nested(nominal, a=first, b=nominal, ab=both))) == named
+    # Nor has it one by itself, where the search took it for one of several.
+    assert list(confirmed(measure, nested(first, a=both, ab=both))) == ["a"] * (len(named) - 1)
+
+
+def test_of_effects_that_are_seen_one_by_one_those_that_leave_least_are_confirmed(
+    viscous: DiscrepancyResult,
+) -> None:
+    """A wave that took next to nothing of the traces was named, and friction by direction was not."""
+    spread = float(np.std(viscous.held_nominal.shot_parameters.log_factor))
+    measure = replace(measure_of(viscous), replicates=ReplicateSpread(spread, 12))
+
+    def model(trace: float, factor: float) -> Any:
+        held = leaving(viscous, trace)
+        scaled = replace(
+            held.shot_parameters, log_factor=factor * viscous.held_nominal.shot_parameters.log_factor
+        )
+        return replace(held, shot_parameters=scaled)
+
+    nominal, wave, all_three = model(1.3, 8.0), model(1.1, 8.0), model(1.1, 1.0)
+    alone = {"a": wave, "b": nominal, "c": model(1.3, 1.0)}
+    assert measure.change(nominal, wave).is_real()
+    each = confirmed(measure, nested(nominal, **alone, ab=wave, ac=all_three, bc=all_three, abc=all_three))
+    assert list(each) == ["c"]
+
+
+@pytest.mark.parametrize(("after", "is_real"), [(2.9, False), (2.6, False), (2.5, True)])
+def test_what_hardly_narrows_the_friction_factors_is_not_confirmed_by_them(
+    after: float, *, is_real: bool
+) -> None:
+    gaps = Gap(1.03, 3.0), Gap(1.0, after)
+    assert (
+        GapChange((Part.FACTORS,), *gaps, closed=0.05, low=0.03, high=0.1, p_value=0.01).is_real() is is_real
+    )
+    assert GapChange((Part.TRACES,), *gaps, closed=0.05, low=0.03, high=0.1, p_value=0.01).is_real()
+
+
 @pytest.mark.parametrize(("p_value", "is_sure"), [(0.0005, True), (0.04, True), (0.06, False)])
 def test_an_effect_may_be_sure_in_the_part_that_falls_less(p_value: float, is_sure: bool) -> None:
     """The factors of a few shots may fall farther by chance than the traces of all do for certain."""

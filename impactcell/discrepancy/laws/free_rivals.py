@@ -14,7 +14,14 @@ import numpy as np
 from impactcell.discrepancy.data import decimate
 from impactcell.discrepancy.laws.free_term import FreeTerm, candidate_terms
 from impactcell.discrepancy.laws.scored_model import ScoredModel, score_term
-from impactcell.discrepancy.laws.standing import SAMPLES, FreeForms, fit_free_forms, outdone_by, stands_beside
+from impactcell.discrepancy.laws.standing import (
+    SAMPLES,
+    FreeForms,
+    fit_free_forms,
+    fit_term,
+    outdone_by,
+    stands_beside,
+)
 from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
 from impactcell.discrepancy.search import (
     CandidateFit,
@@ -32,6 +39,7 @@ from impactcell.discrepancy.search import (
 from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY
 from impactcell.physics.free_form import FreeForm
+from impactcell.physics.free_forms import FINER
 from impactcell.physics.remainder_forms import REMAINDER_FORMS
 
 SCREENED_EFFECTS, FIRST_EFFECTS = 6, 3
@@ -62,16 +70,9 @@ def hold_against_free_forms(context: SearchContext, selection: SelectionResult) 
     if not forms.alone:
         return selection
     if not any(LIBRARY[effect].kind is Kind.BETWEEN_SHOTS for effect in selection.added):
-        free = forms.alone[0]
-        beside = [model for model in _beside_terms(fewer, forms) if not is_at_bound(model.fit)]
-        best = max(beside, key=lambda model: model.score, default=free)
-        if (
-            best.leaves_nothing
-            and best.is_told_from(free)
-            and best.p_value <= MAX_P_VALUE
-            and stands_beside(fewer, best, forms)
-        ):
-            return _accept(context, selection, best, _tied(best, beside))
+        found = _told_beside_terms(fewer, forms)
+        if found is not None:
+            return _accept(context, selection, *found)
     outdone = outdone_by(fewer, selection, forms)
     if outdone is None:
         return selection
@@ -84,7 +85,30 @@ def _asks(context: SearchContext, selection: SelectionResult) -> bool:
     return context.problem.shots.excitation.has_contact and is_open
 
 
-def _beside_terms(context: SearchContext, forms: FreeForms) -> list[ScoredModel]:
+def _told_beside_terms(
+    context: SearchContext, forms: FreeForms
+) -> tuple[ScoredModel, list[ScoredModel]] | None:
+    """Effect that a term shows beside it, and those tied with it; None where there is none.
+
+    Where the likeliest leaves something, its term is given more pieces.
+    """
+    beside = [model for model in beside_terms(context, forms) if not is_at_bound(model.fit)]
+    if not beside:
+        return None
+    best = max(beside, key=lambda model: model.score)
+    if not best.leaves_nothing and best.place in FINER:
+        forms, beside = with_more_pieces(context, forms, beside, best.place)
+        best = max(beside, key=lambda model: model.score)
+    stands = (
+        best.leaves_nothing
+        and best.is_told_from(forms.alone[0])
+        and best.p_value <= MAX_P_VALUE
+        and stands_beside(context, best, forms)
+    )
+    return (best, _tied(best, beside)) if stands else None
+
+
+def beside_terms(context: SearchContext, forms: FreeForms) -> list[ScoredModel]:
     """Fit effects beside each of the terms that promise most."""
     beside: list[ScoredModel] = []
     for form in _places(context, forms.rough):
@@ -96,6 +120,23 @@ def _beside_terms(context: SearchContext, forms: FreeForms) -> list[ScoredModel]
         fits = refine(there, screen(there, scan, EFFECTS_PER_PLACE))
         beside += [_beside(term, fitted, scan) for fitted in fits]
     return beside
+
+
+def with_more_pieces(
+    context: SearchContext, forms: FreeForms, beside: Sequence[ScoredModel], place: str
+) -> tuple[FreeForms, list[ScoredModel]]:
+    """Give the term at a place more pieces, alone and beside each effect, where it leaves something."""
+    form = FINER[place]
+    alone = fit_term(context, forms.rough, form)
+    if alone is None:
+        return forms, list(beside)
+    others = tuple(model for model in forms.alone if model.place != place)
+    all_alone = sorted((score_term(alone, "", 1.0), *others), key=lambda model: -model.score)
+    models = []
+    for model in beside:
+        fitted = None if model.place != place else fit_term(context, _without_term(forms.rough, model), form)
+        models.append(model if fitted is None else score_term(fitted, model.effect, model.p_value))
+    return replace(forms, alone=tuple(all_alone), terms={**forms.terms, place: alone}), models
 
 
 def _places(context: SearchContext, rough: Fit) -> list[FreeForm]:
@@ -155,16 +196,13 @@ def _named_alone(context: SearchContext, selection: SelectionResult, model: Scor
     for alternative in selection.alternatives:
         if alternative.effects == effects:
             return alternative.fit
-    kept = np.array([coordinate.effect != _identifier(model) for coordinate in model.fit.coordinates])
-    start = replace(
-        model.fit,
-        effects=effects,
-        coordinates=tuple(c for c, stays in zip(model.fit.coordinates, kept, strict=True) if stays),
-        theta=model.fit.theta[kept],
-    )
-    (fitted,) = fit_all_samples(context, [start])
+    (fitted,) = fit_all_samples(context, [_without_term(selection.nominal.fit, model)])
     return fitted
 
 
-def _identifier(model: ScoredModel) -> str:
-    return REMAINDER_FORMS[model.place].effect.identifier
+def _without_term(nominal: Fit, model: ScoredModel) -> Fit:
+    """Nominal plant and effect as they stand beside the term."""
+    effects = (*nominal.effects, model.effect)
+    kept = np.array([coordinate.effect in {"", *effects} for coordinate in model.fit.coordinates])
+    coordinates = tuple(c for c, stays in zip(model.fit.coordinates, kept, strict=True) if stays)
+    return replace(model.fit, effects=effects, coordinates=coordinates, theta=model.fit.theta[kept])

@@ -77,7 +77,7 @@ class FreeForms:
 
 def fit_free_forms(context: SearchContext, rough: Fit) -> FreeForms:
     """Fit a free form at every place, each alone; places that the shots do not go through are left out."""
-    fitted = [_fit_term(context, rough, form) for form in REMAINDER_FORMS.values()]
+    fitted = [fit_term(context, rough, form) for form in REMAINDER_FORMS.values()]
     terms = {term.form.place: term for term in fitted if term is not None}
     alone = [score_term(term, "", 1.0) for term in terms.values()]
     filtered = _fit_filter(context, rough)
@@ -86,7 +86,7 @@ def fit_free_forms(context: SearchContext, rough: Fit) -> FreeForms:
     return FreeForms(rough, tuple(sorted(alone, key=lambda model: -model.score)), terms)
 
 
-def _fit_term(context: SearchContext, base: Fit, form: FreeForm) -> FreeTerm | None:
+def fit_term(context: SearchContext, base: Fit, form: FreeForm) -> FreeTerm | None:
     """Fit a term beside a model; None where shots hardly go through its covariate, or it has no answer."""
     span = visited(context.coarse, base, form)
     if span is None:
@@ -178,7 +178,7 @@ def with_second(context: SearchContext, problem: Problem, base: Fit, effect: str
     """Fit free forms beside a model, each by itself, of those that promise most there."""
     there = replace(context, coarse=problem)
     forms = [form for form in REMAINDER_FORMS.values() if form.effect.identifier not in base.effects]
-    fitted = [_fit_term(there, base, form) for form in candidate_terms(problem, base, forms)[:SECOND_FORMS]]
+    fitted = [fit_term(there, base, form) for form in candidate_terms(problem, base, forms)[:SECOND_FORMS]]
     return [score_term(term, effect, 1.0) for term in fitted if term is not None]
 
 

@@ -9,7 +9,7 @@ one direction more than in the other, say, makes the factors go with it as well.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from scipy.stats import f as fisher
@@ -45,10 +45,13 @@ def accept_between_shots(
     rivals : sequence of Fit
         Models with one effect more that were fitted to the traces, at the end of their range or not,
         converged or not: where one of them leaves the factors narrower, nothing between shots has a name,
-        and one that leaves them about as narrow is tied.
+        and one that leaves them about as narrow is tied. So is one that the factors alone speak for, as
+        they do for a tilt of the surface.
     """
     nominal = evidence.fit
-    fits = sorted(_fits(context, evidence), key=lambda fitted: fitted.spread)
+    known = {rival.effects[-1] for rival in rivals}
+    fitted = sorted(_fits(context, evidence, known), key=lambda fitted: fitted.spread)
+    fits = [fit for fit in fitted if acts_between_shots(fit)]
     if not fits:
         return None
     best = fits[0]
@@ -62,13 +65,13 @@ def accept_between_shots(
     if p_value > POLICY.between_shots_error or best.spread > POLICY.max_spread_ratio * nominal.spread:
         return None
     shots = context.problem.count
-    limit = widest_rival(best.spread, shots)
     in_traces, explained = trace_rivals(best.spread, rivals, shots)
-    if explained:
+    alike = factor_rivals(best, fitted, shots)
+    if explained or alike is None:
         return None
-    tied = (*(rival.effects[-1] for rival in fits[1:] if rival.spread <= limit), *in_traces)
+    tied = (*alike, *in_traces)
     alternatives = compare_fits(
-        [CandidateFit(fitted, fitted.log_likelihood(context.problem.shots)) for fitted in fits]
+        [CandidateFit(fit, fit.log_likelihood(context.problem.shots)) for fit in fitted]
     )
     final = context.test_model(best)
     if not has_a_size(context.problem, final):
@@ -94,10 +97,18 @@ def has_a_size(problem: Problem, evidence: ModelEvidence) -> bool:
 
 def trace_rivals(spread: float, rivals: Sequence[Fit], shots: int) -> tuple[tuple[str, ...], bool]:
     """Effects within shots that leave the factors about as narrow, and whether one leaves them narrower."""
-    within = [rival for rival in rivals if LIBRARY[rival.effects[-1]].kind is not Kind.BETWEEN_SHOTS]
+    within = [rival for rival in rivals if not acts_between_shots(rival)]
     limit = widest_rival(spread, shots)
     alike = {rival.effects[-1]: None for rival in within if rival.spread <= limit}
     return tuple(alike), any(rival.spread <= spread for rival in within)
+
+
+def factor_rivals(best: Fit, fitted: Sequence[Fit], shots: int) -> tuple[str, ...] | None:
+    """Effects that leave the factors as narrow as the best between shots; None where one is told from it."""
+    if any(widest_rival(fit.spread, shots) < best.spread for fit in fitted):
+        return None
+    limit = widest_rival(best.spread, shots)
+    return tuple(fit.effects[-1] for fit in fitted if fit is not best and fit.spread <= limit)
 
 
 def widest_rival(spread: float, shots: int) -> float:
@@ -106,12 +117,18 @@ def widest_rival(spread: float, shots: int) -> float:
     return limit
 
 
-def _fits(context: SearchContext, evidence: ModelEvidence) -> list[Fit]:
-    """Fit every effect between shots that the friction factors speak for."""
+def acts_between_shots(model: Fit) -> bool:
+    """Whether the last effect of a model acts between shots and nowhere else."""
+    return LIBRARY[model.effects[-1]].kind is Kind.BETWEEN_SHOTS
+
+
+def _fits(context: SearchContext, evidence: ModelEvidence, known: Collection[str]) -> list[Fit]:
+    """Fit every effect that shots speak for, those between shots and those not `known` from the traces."""
     scan = evidence.candidate_scan
     tasks = []
     for effect in scan.gains():
-        if LIBRARY[effect].kind is not Kind.BETWEEN_SHOTS or scan.p_value_of(effect) > ALPHA:
+        is_fitted = effect in known and LIBRARY[effect].kind is not Kind.BETWEEN_SHOTS
+        if is_fitted or scan.p_value_of(effect) > ALPHA:
             continue
         starts = candidate_scores.starting_points(
             scan.candidates, scan.scores, effect, POLICY.starts_per_effect

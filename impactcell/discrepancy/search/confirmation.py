@@ -11,7 +11,12 @@ from impactcell.discrepancy.search.validation import (
     GapMeasure,
     Part,
     counted_parts,
+    narrows,
 )
+
+VISIBLE_BESIDE = 1.2
+"""Gap of the traces [noise floors] that others must leave without an effect for it to have a name beside
+them. The model error of half a floor that any machine has makes 1.1, and a wave or a patch takes that too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +61,8 @@ def confirmed(measure: GapMeasure, nested: NestedModels, max_p: float = MAX_P_VA
 
     Of several effects it may be that one is not seen while another is missing: then each is asked what it
     closes of what all others leave. They are confirmed if all do; else those that do are asked without the
-    rest, and are confirmed if more of them are than in order.
+    rest, and are confirmed if more of them are than in order, or as many that leave less. Of those that are,
+    one without which the others leave next to nothing goes, and the rest are asked again.
 
     Parameters
     ----------
@@ -65,6 +71,28 @@ def confirmed(measure: GapMeasure, nested: NestedModels, max_p: float = MAX_P_VA
     max_p : float
         One-sided error for each of them.
     """
+    changes = _confirmed(measure, nested, max_p)
+    if len(nested.added) < 2:
+        return changes
+    while (hidden := _least_visible(measure, replace(nested, added=tuple(changes)))) is not None:
+        seen = tuple(effect for effect in changes if effect != hidden)
+        changes = _confirmed(measure, replace(nested, added=seen), max_p)
+    return changes
+
+
+def _least_visible(measure: GapMeasure, nested: NestedModels) -> str | None:
+    """Effect without which the others leave least, if that is next to nothing; else None."""
+    without = {effect: model for effect in nested.added if (model := nested.without(effect)) is not None}
+    gaps = {effect: measure.gap(model) for effect, model in without.items()}
+    whole = measure.gap(nested.largest)
+    hidden = [
+        effect for effect, gap in gaps.items() if gap.trace < VISIBLE_BESIDE and not narrows(gap, whole)
+    ]
+    return min(hidden, key=lambda effect: gaps[effect].trace, default=None)
+
+
+def _confirmed(measure: GapMeasure, nested: NestedModels, max_p: float) -> dict[str, GapChange]:
+    """Confirm effects in order, or else each beside all others."""
     in_order = _in_order(measure, nested, max_p)
     if len(in_order) == len(nested.added):
         return in_order
@@ -78,8 +106,13 @@ def confirmed(measure: GapMeasure, nested: NestedModels, max_p: float = MAX_P_VA
         return in_order if _rises(measure, nested.nominal, nested.largest, each.values()) else each
     if frozenset(real) not in nested.models:
         return in_order
-    fewer = confirmed(measure, replace(nested, added=real), max_p)
-    return fewer if len(fewer) > len(in_order) else in_order
+    fewer = _confirmed(measure, replace(nested, added=real), max_p)
+    return max(in_order, fewer, key=lambda changes: (len(changes), -_left(measure, nested, changes)))
+
+
+def _left(measure: GapMeasure, nested: NestedModels, changes: Mapping[str, GapChange]) -> float:
+    """Gap that the model with these effects leaves."""
+    return measure.gap(nested.models[frozenset(changes)]).of(Part)
 
 
 def _in_order(measure: GapMeasure, nested: NestedModels, max_p: float) -> dict[str, GapChange]:

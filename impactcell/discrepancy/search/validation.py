@@ -12,6 +12,7 @@ from scipy.stats import t as student
 
 from impactcell.discrepancy.data import CHANNELS, PHASES, IndexArray, NoiseFloor, ReplicateSpread
 from impactcell.discrepancy.model import Fit, Problem, sample_phases, trajectory_of
+from impactcell.discrepancy.search.policy import POLICY
 from impactcell.records import Samples
 
 MIN_OPEN_GAP = 1.05
@@ -24,7 +25,8 @@ MAX_P_VALUE = 0.1
 """One-sided error of the held-out shots' test, beside an interval above 0: they confirm what other shots have
 found at an error of 1 %, so that both together err once in a thousand."""
 MIN_CLOSED_SHARE = 0.02
-"""Share of the held-out gap that an effect must close: a fall may be certain and still be too small."""
+"""Share of the held-out gap that an effect must close: a fall may be certain and still be too small. Friction
+factors it must narrow by as much as the search asks for: what changes the traces changes them a little."""
 NOISE_TOLERANCE = 0.05
 """Relative error of a stated noise: two digits."""
 MAX_EXPECTED_GAP = 1.3
@@ -90,6 +92,8 @@ class GapChange:
 
     def is_real(self, max_p: float = MAX_P_VALUE) -> bool:
         """Whether independent shots agree that the gap falls, and by more than a trifle."""
+        if self.parts == (Part.FACTORS,) and not narrows(self.before, self.after):
+            return False
         return self.low > 0.0 and self.closed >= MIN_CLOSED_SHARE and self.p_value <= max_p
 
 
@@ -266,6 +270,11 @@ class Validation:
     def gap_after(self) -> float:
         """Held-out gap of the final model."""
         return self.whole(self.held_out.after)
+
+
+def narrows(before: Gap, after: Gap) -> bool:
+    """Whether the friction factors become narrower by more than a trifle."""
+    return after.factor <= POLICY.max_spread_ratio * before.factor
 
 
 def counted_parts(
