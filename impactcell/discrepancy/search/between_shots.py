@@ -45,8 +45,8 @@ def accept_between_shots(
     rivals : sequence of Fit
         Models with one effect more that were fitted to the traces, at the end of their range or not,
         converged or not: where one of them leaves the factors narrower, nothing between shots has a name,
-        and one that leaves them about as narrow is tied. So is one that the factors alone speak for, as
-        they do for a tilt of the surface.
+        and one that leaves them about as narrow is tied. So is any other that does so, although the traces
+        do not speak for it, as they do not for a tilt of the surface.
     """
     nominal = evidence.fit
     known = {rival.effects[-1] for rival in rivals}
@@ -123,13 +123,13 @@ def acts_between_shots(model: Fit) -> bool:
 
 
 def _fits(context: SearchContext, evidence: ModelEvidence, known: Collection[str]) -> list[Fit]:
-    """Fit every effect that shots speak for, those between shots and those not `known` from the traces."""
+    """Fit every effect between shots that the factors speak for and, if any, all within them not `known`."""
     scan = evidence.candidate_scan
+    between = {name for name in scan.gains() if LIBRARY[name].kind is Kind.BETWEEN_SHOTS}
+    spoken_for = [name for name in scan.gains() if name in between and scan.p_value_of(name) <= ALPHA]
+    others = [name for name in scan.gains() if name not in between | set(known)]
     tasks = []
-    for effect in scan.gains():
-        is_fitted = effect in known and LIBRARY[effect].kind is not Kind.BETWEEN_SHOTS
-        if is_fitted or scan.p_value_of(effect) > ALPHA:
-            continue
+    for effect in (*spoken_for, *others) if spoken_for else ():
         starts = candidate_scores.starting_points(
             scan.candidates, scan.scores, effect, POLICY.starts_per_effect
         )
