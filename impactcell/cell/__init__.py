@@ -1,5 +1,6 @@
 """One cycle of a cell, from what was measured to what is shown: `pipeline`, after `preprocessing`."""
 
+from impactcell.cell.model_change import PROVISIONAL, in_place_of
 from impactcell.cell.pipeline import (
     CellDesign,
     CellState,
@@ -15,12 +16,14 @@ from impactcell.cell.pipeline import (
 )
 
 __all__ = [
+    "PROVISIONAL",
     "CellDesign",
     "CellState",
     "StepResult",
     "apply_event",
     "apply_rule_result",
     "expire_shelving",
+    "in_place_of",
     "initial_state",
     "migrate_state",
     "reset_wear_level",

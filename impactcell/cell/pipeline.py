@@ -10,7 +10,6 @@ people do to a condition; `start_batch` and `reset_wear_level` what they do to t
 `CellState`, which `impactcell.serialization` writes and reads back bit for bit.
 """
 
-import hashlib
 import math
 from dataclasses import dataclass, field, replace
 
@@ -23,6 +22,7 @@ from impactcell.alarms import (
     RuleResult,
     Transition,
 )
+from impactcell.cell.model_change import REPLACED, model_digest
 from impactcell.cell.preprocessing import (
     BatchNaming,
     CaptureDefaults,
@@ -44,7 +44,6 @@ from impactcell.records import (
     Quality,
     Snapshot,
 )
-from impactcell.serialization import pack
 from impactcell.tracking import wear_batch
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker as signature
@@ -134,7 +133,7 @@ def initial_state(design: CellDesign) -> CellState:
         gap_cusum.GapState(),
         alarms.initial_state(design.alarms),
         grid=_grid(design),
-        model_digest=_model_digest(design),
+        model_digest=model_digest(design.model),
     )
 
 
@@ -142,24 +141,22 @@ def migrate_state(design: CellDesign, state: CellState) -> CellState:
     """Make a state fit the design: what is learned on another grid or by another model is learned anew.
 
     Another model moves the estimates, as another batch would, and what residuals are usual: the next cycle is
-    an expected change, and says nothing of the material.
+    an expected change, and says nothing of the material. Wear learned by a provisional model is learned anew.
     """
     if state.grid != _grid(design):
         state = replace(state, signature=signature.initial_state(design.signature), grid=_grid(design))
-    digest = _model_digest(design)
+    digest = model_digest(design.model)
     if state.model_digest == digest:
         return state
     has_changed = bool(state.model_digest)
+    if has_changed and design.model.provenance.get(REPLACED) == state.model_digest:
+        state = replace(state, tracker=TrackerState(clock=state.tracker.clock))
     gap = gap_cusum.GapState() if has_changed else state.gap
     return replace(state, gap=gap, model_digest=digest, model_changed=state.model_changed or has_changed)
 
 
 def _grid(design: CellDesign) -> tuple[float, int]:
     return design.signature.length_m, design.signature.points
-
-
-def _model_digest(design: CellDesign) -> str:
-    return hashlib.sha256(pack(design.model)).hexdigest()[:16]
 
 
 def step(

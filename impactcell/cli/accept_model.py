@@ -8,11 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from impactcell.cell import in_place_of
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.errors import SettingsError
 from impactcell.prediction import Model
 from impactcell.process.console import print_note, print_result
-from impactcell.settings import read_cell
+from impactcell.settings import CellConfig, read_cell
 from impactcell.settings.judgement import judge_cell
 from impactcell.settings.model_file import read_model, write_model
 
@@ -35,10 +36,7 @@ def accept_model(cell: Path, extended: Path, *, as_json: bool = False) -> None:
     """
     cell_config = read_cell(cell)
     model = calibrated_model(replace(cell_config, model=read_model(extended)))
-    target = cell_config.settings.model
-    previous = previous_model(target)
-    previous.write_bytes(target.read_bytes())
-    write_model(model, target)
+    previous = put_into_service(cell_config, model)
     for finding in judge_cell(read_cell(cell)):
         if finding.is_fault:
             print_note(str(finding))
@@ -47,6 +45,21 @@ def accept_model(cell: Path, extended: Path, *, as_json: bool = False) -> None:
         f"{cell_config.name} runs with model {model.name} from the next cycle on; before: {previous}",
         as_json=as_json,
     )
+
+
+def put_into_service(config: CellConfig, model: Model) -> Path:
+    """Write a model in the place of the cell's own, and return where that is kept from now on.
+
+    Raises
+    ------
+    SettingsError
+        A file cannot be written.
+    """
+    target = config.settings.model
+    previous = previous_model(target)
+    previous.write_bytes(target.read_bytes())
+    write_model(in_place_of(config.model, model), target)
+    return previous
 
 
 def restore_model(cell: Path, *, as_json: bool = False) -> None:

@@ -11,14 +11,14 @@ from typing import Final
 from impactcell.api.first_model import TAPS, FirstModel, fit_first_model
 from impactcell.campaign import Campaign, read
 from impactcell.campaign.recorded_campaign import from_captures
-from impactcell.cli.accept_model import previous_model
+from impactcell.cell import PROVISIONAL
+from impactcell.cli.accept_model import put_into_service
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.paths import note_damage, open_journal
 from impactcell.errors import CampaignError, PredictionError, SettingsError
 from impactcell.process.console import print_note, print_result
 from impactcell.settings import CellConfig, read_cell
 from impactcell.settings.judgement import judge_cell
-from impactcell.settings.model_file import write_model
 
 MOST_TAPS: Final = 240
 """Taps that are taken at most where fewer are not good enough: more of the same would not be either."""
@@ -48,10 +48,10 @@ def fit_model(
         say_first_model(first, None, as_json=as_json)
         raise PredictionError("not put into service (--anyway would)")
     model = calibrated_model(replace(config, model=first.fit.model))
-    target = config.settings.model
-    previous_model(target).write_bytes(target.read_bytes())
-    write_model(model, target)
-    say_first_model(first, target, as_json=as_json)
+    put_into_service(config, model)
+    say_first_model(first, config.settings.model, as_json=as_json)
+    if PROVISIONAL in config.model.provenance:
+        print_note("wear and batches are learned anew: what was learned by the provisional model is not kept")
     for finding in judge_cell(read_cell(cell)):
         if finding.is_fault or finding.section == "sensors":  # taps show what noise there is
             print_note(str(finding))

@@ -14,6 +14,7 @@ import yaml
 
 from impactcell.api.first_model import fit_first_model
 from impactcell.campaign import Campaign, read
+from impactcell.cell import PROVISIONAL
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.first_model import say_first_model
 from impactcell.cli.paths import check_directory
@@ -180,7 +181,7 @@ def provisional_model(answers: Answers) -> Model:
         plant,
         prior,
         stroke_m=answers.stroke_mm * 1e-3,
-        provenance={"made by": "impactcell init", "provisional": note},
+        provenance={"made by": "impactcell init", PROVISIONAL: note},
     )
 
 

@@ -218,8 +218,10 @@ class CellWorker:
     def _fitted(self, design: CellDesign, state: CellState) -> CellState:
         """Make the state fit the design; what that costs is told, here and by the signature's quality."""
         fitted = core.migrate_state(design, state)
-        if fitted is not state:
+        if fitted.signature is not state.signature:
             self.log.warning("the grid of the signature was changed: the signature is learned anew")
+        if fitted.tracker is not state.tracker:
+            self.log.warning("the provisional model was replaced: wear and batches are learned anew")
         return fitted
 
     def _step(

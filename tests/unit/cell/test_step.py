@@ -9,7 +9,7 @@ import pytest
 from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, EventKind, Notification
 from impactcell.alarms.rules import module_connection
-from impactcell.cell import CellDesign, CellState
+from impactcell.cell import PROVISIONAL, CellDesign, CellState, in_place_of
 from impactcell.records import BatchAnnouncement, Capture, PositioningState, Quality, Shelving
 from impactcell.service.factory import cell_design
 from impactcell.settings import read_cell
@@ -183,6 +183,31 @@ def test_a_state_of_another_grid_learns_its_signature_anew(design: CellDesign, l
     assert core.migrate_state(wider, fitted) is fitted
     done = core.step(wider, fitted, capture(LEARNED + 1), PositioningState())
     assert len(done.snapshot.signature.friction) == 40
+
+
+def test_what_was_learned_by_a_provisional_model_is_learned_anew_and_only_once(
+    design: CellDesign, learned: CellState
+) -> None:
+    """The level of friction by a guessed model stayed the wear level for good, and the true one an offset."""
+    guessed = replace(design.model, provenance={PROVISIONAL: "nothing measured"})
+    begun = core.migrate_state(replace(design, model=guessed), learned)
+    fitted = replace(design, model=in_place_of(guessed, design.model))
+    anew = core.migrate_state(fitted, begun)
+    assert anew.model_changed
+    assert anew.tracker.bank.size == 0
+    assert anew.tracker.clock == begun.tracker.clock
+    assert anew.batch == begun.batch
+    stepped = core.step(fitted, anew, capture(LEARNED + 1, mu_s=0.24), PositioningState())
+    assert stepped.snapshot.wear.level == pytest.approx(0.24, abs=0.01)
+    assert core.migrate_state(fitted, stepped.state) is stepped.state
+    # who calibrates or extends the model afterwards loses nothing, nor does who never had a provisional one
+    for model in (replace(fitted.model, name="calibrated"), in_place_of(fitted.model, design.model)):
+        assert (
+            core.migrate_state(replace(design, model=model), stepped.state).tracker is stepped.state.tracker
+        )
+    assert in_place_of(design.model, guessed) is guessed
+    assert in_place_of(guessed, guessed) is guessed
+    assert in_place_of(design.model, design.model) is design.model
 
 
 def test_another_model_is_an_expected_change_of_one_cycle(design: CellDesign, learned: CellState) -> None:

@@ -16,6 +16,8 @@ import yaml
 
 from impactcell.api.first_model import FirstModel
 from impactcell.campaign import Campaign, read
+from impactcell.cell import in_place_of
+from impactcell.cli.accept_model import put_into_service
 from impactcell.cli.app import run_verb
 from impactcell.errors import CampaignError, ImpactCellError, PredictionError, SettingsError
 from impactcell.journal.store import Journal
@@ -24,6 +26,7 @@ from impactcell.prediction import calibration
 from impactcell.prediction.joint_plant_fit import PlantFit
 from impactcell.process.shipped import shipped_config
 from impactcell.settings import read_cell
+from impactcell.settings.model_file import read_model
 from simulator.campaign_files import write
 from simulator.campaign_scenario import CampaignScenario
 from tests.snapshots import make_snapshot
@@ -235,6 +238,24 @@ def test_more_noise_in_the_taps_than_was_said_is_told(
     cell.write_text(f"{written}sensors: {{position_noise_std_um: 1.5}}\n")
     run("check", cell)
     assert "0.4 N is taken, a guess; the first taps of its journal show 0.4" in capsys.readouterr().err
+
+
+def test_a_model_that_takes_the_place_of_a_provisional_one_says_so_until_another_does(
+    begun: Path, tmp_path: Path
+) -> None:
+    """By that the service knows that what it has learned by a guess is to be learned anew."""
+    shutil.copytree(begun, tmp_path / "own")
+    cell = tmp_path / "own" / "own.yaml"
+    guessed, fitted = read_cell(cell).model, read_cell(shipped_config() / "cells" / "prototype.yaml").model
+    kept = put_into_service(read_cell(cell), fitted)
+    assert read_model(kept).provenance == guessed.provenance
+    marked = read_cell(cell).model
+    assert marked == in_place_of(guessed, fitted)
+    assert marked.provenance != fitted.provenance
+    put_into_service(read_cell(cell), replace(fitted, name="again"))
+    assert read_cell(cell).model.provenance == marked.provenance, "no cycle need have come by then"
+    other = replace(fitted, provenance={"made by": "hand"})
+    assert in_place_of(fitted, other) is other
 
 
 def test_the_first_taps_of_the_journal_make_the_model(

@@ -1,0 +1,30 @@
+"""What another model means for what a cell has learned by the one before it."""
+
+import hashlib
+from dataclasses import replace
+from typing import Final
+
+from impactcell.prediction import Model
+from impactcell.serialization import pack
+
+PROVISIONAL: Final = "provisional"
+"""In the provenance of a model that nothing was measured of."""
+REPLACED: Final = "replaces provisional"
+"""In that of a model which takes its place: its digest."""
+
+
+def model_digest(model: Model) -> str:
+    """Digest by which a state knows the model that it was learned with."""
+    return hashlib.sha256(pack(model)).hexdigest()[:16]
+
+
+def in_place_of(before: Model, model: Model) -> Model:
+    """Model that takes the place of another, and says so where that was provisional.
+
+    What was learned by a provisional model is learned anew: its friction was a guess. Until a cycle has come,
+    a second model takes the place of the provisional one as well.
+    """
+    digest = model_digest(before) if PROVISIONAL in before.provenance else before.provenance.get(REPLACED)
+    if digest is None or PROVISIONAL in model.provenance:
+        return model
+    return replace(model, provenance={**model.provenance, REPLACED: digest})
