@@ -187,10 +187,10 @@ class AlarmRule:
     node_number, type_number : int
         Identifiers of the condition and of its type in the NodeSet2 file, never used for another; conditions
         are listed in the order of the first.
-    description : str
-        What it says, in a sentence; of its node and in the docs.
     title : Message
         What it is called where it has nothing to say.
+    description : Message
+        What it says, in a sentence; of its node and in the docs.
     settings : RuleSettings
         Defaults of what a cell may choose.
     condition_class : ConditionClass
@@ -216,7 +216,7 @@ class AlarmRule:
     node_number: int
     type_number: int
     title: Message
-    description: str
+    description: Message
     settings: RuleSettings
     condition_class: ConditionClass = ConditionClass.PROCESS
     input_node: str = ""

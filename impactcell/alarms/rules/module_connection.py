@@ -22,7 +22,7 @@ RULE = AlarmRule(
     node_number=5011,
     type_number=1006,
     title=Message("Module connection", "Verbindung zum Modul"),
-    description="The module does not answer.",
+    description=Message("The module does not answer.", "Das Modul antwortet nicht."),
     settings=RuleSettings(severity=800),
     condition_class=ConditionClass.SYSTEM,
     input_node="Module/Connected",

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import impactcell
 from impactcell.alarms import rules
+from impactcell.scada.german import GERMAN
 
 RULE = '''
 """Sticky: static friction is far above the level that wear explains."""
@@ -32,7 +33,8 @@ def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
 
 RULE = AlarmRule(
     name=NAME, node_number=5099, type_number=1099, title=Message("Sticky part", "Klebendes Teil"),
-    description="The part sticks.", input_node="Friction/StaticFriction", evaluate=evaluate,
+    description=Message("The part sticks.", "Das Teil klebt."),
+    input_node="Friction/StaticFriction", evaluate=evaluate,
     settings=RuleSettings(severity=450, on_delay=1, off_delay=2, activate_above=1.5, clear_below=1.2),
 )
 '''
@@ -44,6 +46,7 @@ from xml.etree import ElementTree
 
 from impactcell import alarms
 from impactcell.journal.stored_forms import ALARM, load_alarm
+from impactcell.scada.german import GERMAN
 from impactcell.scada.nodeset import nodeset
 from impactcell.serialization import pack, unpack
 from impactcell.service.factory import cell_design
@@ -69,6 +72,7 @@ assert abs(alarm.evidence.statistic - 2.0) < 1e-12 and alarm.evidence.false_alar
 assert alarms.NAMES[-1] == "Sticky"
 assert pack(unpack(alarms.AlarmSetState, pack(state))) == pack(state)
 assert load_alarm(ALARM.dumps(alarm)).message_de == alarm.message_de
+assert GERMAN["The part sticks."] == "Das Teil klebt."
 names = {e.get("BrowseName") for e in ElementTree.fromstring(nodeset())}
 assert {"1:Sticky", "1:StickyAlarmType"} <= names, sorted(filter(None, names))
 
@@ -128,5 +132,6 @@ def test_every_rule_lies_in_a_file_of_its_name() -> None:
 
 def test_every_rule_speaks_both_languages() -> None:
     for rule in rules.RULES.values():
+        assert GERMAN[rule.description.english] == rule.description.german != rule.description.english
         assert rule.title.text("de-AT") == rule.title.german != rule.title.text("en")
         assert rule.title.text("fr") == rule.title.english
