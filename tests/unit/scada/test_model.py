@@ -9,6 +9,7 @@ import pytest
 import impactcell
 from impactcell.alarms import RULES
 from impactcell.quantities import BY_PATH, CYCLE, HISTORY, MODULE
+from impactcell.records.quantity import DataType
 from impactcell.scada import nodeset as of_nodes
 from impactcell.scada.nodeset import MODEL_FILE, next_free, nodeset
 
@@ -117,4 +118,5 @@ def test_every_condition_watches_what_is_published() -> None:
 def test_what_has_a_history_is_kept() -> None:
     for quantity in CYCLE:
         assert not quantity.has_history or (quantity.column and quantity.quality_column), quantity.path
+        assert not quantity.has_history or quantity.data_type is DataType.DOUBLE, quantity.path
         assert (quantity.unit is None) == (quantity.eu_range is None), quantity.path
