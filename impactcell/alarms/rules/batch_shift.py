@@ -65,7 +65,7 @@ RULE = AlarmRule(
         "The material has changed: friction has shifted from one cycle to the next.",
         "Das Material hat gewechselt: die Reibung ist von einem Zyklus zum nächsten gesprungen.",
     ),
-    settings=RuleSettings(severity=500, off_delay=50),
+    settings=RuleSettings(severity=500, off_delay=50, told_step=0.0),
     input_node="Batch/Offset",
     evaluate=evaluate,
     suppressed_by_announcement=True,

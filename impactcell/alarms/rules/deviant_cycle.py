@@ -66,7 +66,7 @@ RULE = AlarmRule(
         "The last cycle differs from the cycles the cell has learned.",
         "Der letzte Zyklus weicht von den gelernten ab.",
     ),
-    settings=RuleSettings(severity=400, off_delay=1),
+    settings=RuleSettings(severity=400, off_delay=1, told_step=0.0),
     input_node="Signature/TSquared",
     evaluate=evaluate,
     explained_by=(model_gap.NAME,),

@@ -23,7 +23,7 @@ RULE = AlarmRule(
     type_number=1009,
     title=Message("Journal fault", "Journal gestört"),
     description=Message("Cycles cannot be stored.", "Zyklen können nicht gespeichert werden."),
-    settings=RuleSettings(severity=900),
+    settings=RuleSettings(severity=900, told_step=0.0),
     condition_class=ConditionClass.SYSTEM,
     logged_by_cause=True,
 )

@@ -23,7 +23,7 @@ RULE = AlarmRule(
     type_number=1006,
     title=Message("Module connection", "Verbindung zum Modul"),
     description=Message("The module does not answer.", "Das Modul antwortet nicht."),
-    settings=RuleSettings(severity=800),
+    settings=RuleSettings(severity=800, told_step=0.0),
     condition_class=ConditionClass.SYSTEM,
     input_node="Module/Connected",
     logged_by_cause=True,

@@ -27,7 +27,7 @@ RULE = AlarmRule(
         "A positioning task has stopped short of its target.",
         "Eine Positionieraufgabe endete vor ihrem Ziel.",
     ),
-    settings=RuleSettings(severity=600),
+    settings=RuleSettings(severity=600, told_step=0.0),
     input_node="Positioning/Remaining",
 )
 """The rule."""
