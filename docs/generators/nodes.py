@@ -37,8 +37,9 @@ def variables() -> str:
         arguments = below.get((node.attrib["NodeId"], "InputArguments"))
         typed = _arguments(arguments) if kind == "UAMethod" else node.attrib.get("DataType", "")
         path = f"{folder}/{name}" if folder else name
-        rows.append((code(path), kind.removeprefix("UA").lower(), typed, description))
-    return table(("path below the cell", "kind", "type, or arguments", "description"), rows)
+        history = "yes" if node.attrib.get("Historizing") == "true" else ""
+        rows.append((code(path), kind.removeprefix("UA").lower(), typed, history, description))
+    return table(("path below the cell", "kind", "type, or arguments", "history", "description"), rows)
 
 
 def _name(node: ET.Element) -> str:

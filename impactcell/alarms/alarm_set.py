@@ -67,7 +67,10 @@ def initial_state(settings: AlarmSettings) -> AlarmSetState:
 
 
 def evaluate(settings: AlarmSettings, state: AlarmSetState, inputs: CycleInputs) -> list[RuleResult]:
-    """Ask every rule that looks at cycles; one that holds says how rarely it was designed to be wrong."""
+    """Ask every rule that looks at cycles; one that holds says how rarely it was designed to be wrong.
+
+    Where its evidence leaves that open, it is as often as the cell wants it of every rule.
+    """
     results = [
         rule.evaluate(inputs, RuleContext(settings.rule(name), state.alarm(name).active))
         for name, rule in RULES.items()
@@ -82,7 +85,8 @@ def evaluate(settings: AlarmSettings, state: AlarmSetState, inputs: CycleInputs)
 
 
 def _rated(evidence: Evidence, inputs: CycleInputs) -> Evidence:
-    cycles = inputs.false_alarm_cycles
+    own = evidence.false_alarm_cycles
+    cycles = inputs.false_alarm_cycles if math.isnan(own) else own
     return replace(
         evidence, false_alarm_cycles=cycles, false_alarm_days=cycles * inputs.period_s / SECONDS_A_DAY
     )

@@ -67,7 +67,6 @@ def debounce(
 
 def is_news(settings: RuleSettings, told: Evidence, now: Evidence) -> bool:
     """Whether evidence has changed by the agreed step since it was told."""
-    if now == told:
-        return False
-    step = settings.told_step * now.size_std
-    return not abs(now.size - told.size) < step
+    if now == told or settings.told_step == 0.0:
+        return now != told
+    return abs(now.size - told.size) >= settings.told_step * now.size_std

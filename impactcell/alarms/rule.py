@@ -79,7 +79,8 @@ class RuleSettings:
         Hysteresis of the rule's statistic; nan for a rule that has a threshold of its own.
     told_step : float
         While the alarm is active, evidence is told anew once its size has changed by so many of its standard
-        deviations; 0 tells every change, as of a rule whose every result is an occurrence of its own.
+        deviations, and not where it has no size; 0 tells every change, as of a rule whose every result is an
+        occurrence of its own.
     """
 
     severity: int = 500
@@ -89,7 +90,7 @@ class RuleSettings:
     enabled: bool = True
     activate_above: float = math.nan
     clear_below: float = math.nan
-    told_step: float = 0.0
+    told_step: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,10 +188,10 @@ class AlarmRule:
     node_number, type_number : int
         Identifiers of the condition and of its type in the NodeSet2 file, never used for another; conditions
         are listed in the order of the first.
-    description : str
-        What it says, in a sentence; of its node and in the docs.
     title : Message
         What it is called where it has nothing to say.
+    description : Message
+        What it says, in a sentence; of its node and in the docs.
     settings : RuleSettings
         Defaults of what a cell may choose.
     condition_class : ConditionClass
@@ -216,7 +217,7 @@ class AlarmRule:
     node_number: int
     type_number: int
     title: Message
-    description: str
+    description: Message
     settings: RuleSettings
     condition_class: ConditionClass = ConditionClass.PROCESS
     input_node: str = ""

@@ -19,6 +19,7 @@ from impactcell.errors import CampaignError, DiscrepancyError
 from impactcell.physics import Plant
 from impactcell.prediction import Model
 from impactcell.process.console import print_result
+from impactcell.process.extras import how_to_install
 from impactcell.process.progress import named_steps
 
 
@@ -159,6 +160,6 @@ def _mapper(scheduler: str | None) -> Iterator[Mapper]:
     try:
         from impactcell.cli.cluster import cluster_mapper
     except ImportError as error:
-        raise DiscrepancyError("--scheduler needs dask: pip install 'impactcell[cluster]'") from error
+        raise DiscrepancyError(f"--scheduler needs dask: run {how_to_install('cluster')}") from error
     with cluster_mapper(scheduler) as mapper:
         yield mapper

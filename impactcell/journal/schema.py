@@ -81,7 +81,13 @@ _ORDER = (
 )
 """Columns in the order that files have had since format 3; those of later quantities come after them."""
 
-_SQL_TYPES = {DataType.DOUBLE: "REAL", DataType.UINT32: "INTEGER", DataType.STRING: "TEXT"}
+_SQL_TYPES = {
+    DataType.DOUBLE: "REAL",
+    DataType.UINT32: "INTEGER",
+    DataType.STRING: "TEXT",
+    DataType.BOOLEAN: "INTEGER",
+}
+"""How values are stored; a flag is 0 or 1."""
 
 
 def _value(quantity: Quantity[Snapshot]) -> Callable[[Capture, Snapshot], Value]:

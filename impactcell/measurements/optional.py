@@ -1,4 +1,4 @@
-"""Libraries that read files, some of them installed apart with `pip install impactcell[import]`."""
+"""Libraries that read files, some of them installed apart."""
 
 import contextlib
 import importlib
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from impactcell.errors import MeasurementError
+from impactcell.process.extras import how_to_install
 
 
 def reader_library(module: str, kind: str, path: Path) -> Any:
@@ -22,8 +23,7 @@ def reader_library(module: str, kind: str, path: Path) -> Any:
     except ImportError as error:
         raise MeasurementError(
             f"{path}: {kind} files are read with {module.partition('.')[0]}, which is not installed; run "
-            f"pip install "
-            f"'impactcell[import]', or export the file as CSV"
+            f"{how_to_install('import')}, or export the file as CSV"
         ) from error
 
 

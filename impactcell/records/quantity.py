@@ -72,7 +72,7 @@ class Quantity(Generic[S]):
     column, quality_column : str or None
         Columns of the journal that hold it; None where it is not kept.
     has_history : bool
-        Whether clients can read its past; it has both columns then.
+        Whether clients can read its past; it has both columns then, and is a Double.
     """
 
     path: str

@@ -1,4 +1,4 @@
-"""German names and states, by the English ones; alarms and quantities bring their own titles."""
+"""German names and states, by the English ones; alarms bring their own words, quantities their own titles."""
 
 from collections.abc import Mapping
 from typing import Any, Final
@@ -132,5 +132,6 @@ GERMAN: Final[Mapping[str, str]] = {
     **{quantity.path.rpartition("/")[2]: quantity.title[1] for quantity in _QUANTITIES},
     **_NAMES,
     **{name: rule.title.german for name, rule in RULES.items()},
+    **{rule.description.english: rule.description.german for rule in RULES.values()},
 }
 """Of two quantities of one name the text here is the one in `_NAMES`, which fits both."""

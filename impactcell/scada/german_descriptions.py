@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Final
 
 DESCRIPTIONS: Final[Mapping[str, str]] = {
-    "A positioning task has stopped short of its target.": "Eine Positionieraufgabe endete vor ihrem Ziel.",
     "Adds a comment to the condition.": "Fügt der Meldung einen Kommentar hinzu.",
     "All machines of this server.": "Alle Maschinen dieses Servers.",
     "Arguments of the method.": "Argumente der Methode.",
@@ -20,7 +19,6 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
     "Commanded velocity of the actuator.": "Befohlene Geschwindigkeit des Aktors.",
     "Comment of the last action on the condition.": "Kommentar der letzten Handlung an der Meldung.",
     "Cycle of the last change of state.": "Zyklus der letzten Zustandsänderung.",
-    "Cycles cannot be stored.": "Zyklen können nicht gespeichert werden.",
     "Cycles received since the service started.": "Empfangene Zyklen seit dem Start des Dienstes.",
     "Cycles the module counted but the service never saw or stored.": (
         "Vom Modul gezählte Zyklen, die nie ankamen oder nicht gespeichert sind."
@@ -67,7 +65,6 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
     "Level at which the cell counts as worn.": "Niveau, ab dem die Zelle als verschlissen gilt.",
     "Longest time the alarm can be shelved, ms.": "Längste Zeit der Zurückstellung, ms.",
     "Lower end of the 95 % interval of CyclesToLimit.": "Unteres Ende des 95-%-Bereichs der übrigen Zyklen.",
-    "Measurements no longer fit the model.": "Messungen passen nicht mehr zum Modell.",
     "Misfit of model and measurement; 1 is the noise of the sensors.": (
         "Abweichung von Modell und Messung; 1 ist das Rauschen der Sensoren."
     ),
@@ -126,21 +123,8 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
     ),
     "The cell.": "Die Zelle.",
     "The cells of this server.": "Die Zellen dieses Servers.",
-    "The filtered friction has probably passed the wear limit.": (
-        "Die gefilterte Reibung hat wahrscheinlich die Verschleißgrenze überschritten."
-    ),
-    "The filtered friction will probably pass the wear limit soon.": (
-        "Die gefilterte Reibung überschreitet wahrscheinlich bald die Verschleißgrenze."
-    ),
-    "The last cycle differs from the cycles the cell has learned.": (
-        "Der letzte Zyklus weicht von den gelernten ab."
-    ),
     "The link to the module.": "Die Verbindung zum Modul.",
-    "The material has changed: friction has shifted from one cycle to the next.": (
-        "Das Material hat gewechselt: die Reibung ist von einem Zyklus zum nächsten gesprungen."
-    ),
     "The model that the estimators use.": "Das Modell, das die Schätzer verwenden.",
-    "The module does not answer.": "Das Modul antwortet nicht.",
     "The positioning task that runs, if one does.": "Die laufende Positionieraufgabe, wenn es eine gibt.",
     "The present batch of material against the reference batch.": "Jetzige Charge gegen die Bezugscharge.",
     "The same in days at the present rate of cycles.": "Dasselbe in Tagen beim jetzigen Takt.",

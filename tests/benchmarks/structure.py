@@ -57,13 +57,11 @@ def duplicate_names(parsed: Sequence[_syntax.Module]) -> Count:
 
 
 def glossary(root: Path) -> tuple[list[str], list[str]]:
-    """Give the words of the glossary, as often as they are listed, and the names it has retired."""
-    page = root / "docs" / "glossary.md"
-    if not page.is_file():
-        return [], []
+    """Give the words of the glossary, as often as they are listed, and the names that were retired."""
+    pages = [root / "docs" / name for name in ("glossary.md", "contributing.md")]
     words, retired = [], []
     section = ""
-    for line in page.read_text(encoding="utf-8").splitlines():
+    for line in (line for page in pages if page.is_file() for line in page.read_text("utf-8").splitlines()):
         if line.startswith("#"):
             section = line.lstrip("# ").lower()
         cells = [cell.strip() for cell in line.strip("|").split("|")] if line.startswith("|") else []

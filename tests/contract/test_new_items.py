@@ -1,13 +1,15 @@
-"""One file is all that a new effect or a new published value takes: tried on a copy of the tree.
+"""What the pages say a new effect or a new published value takes is all of it: tried on a copy of the tree.
 
 For an alarm rule `tests/unit/alarms/test_new_rule.py` does the same. In the copy the tests that know what
 there is (of the library, the nodes, the stored columns) have to pass as they are.
 """
 
 import os
+import re
 import shutil
 import subprocess
 import sys
+import textwrap
 from pathlib import Path
 
 import pytest
@@ -57,12 +59,18 @@ class ConstantPull(Effect):
     def body_force(self, x: float, v: float, t: float) -> float:
         return self._pull_n
 '''
-QUANTITY = '''    _Q("Model/CombinedFriction", 6901, "mu_s by equation (6).", ("µs by (6)", "µs nach (6)"),
-       lambda s: s.friction.combined.value, lambda s: s.friction.combined.quality, ONE, _friction_range,
-       column="mu_combined", quality_column="mu_combined_quality", has_history=True),
+END = ')\n"""Quantities that each cycle writes."""\n'
+"""Of the table to which the page adds its row."""
+LANGUAGES = (
+    "tests/integration/test_opcua_languages.py::test_every_name_and_description_of_a_cell_is_there_in_german"
 )
-"""Quantities that each cycle writes."""
-'''
+
+
+def blocks_of_the_page() -> list[str]:
+    """The row of the table and the line of German that the how-to gives as its example."""
+    page = (ROOT / "docs" / "how-to" / "published-value.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^   ```text\n(.*?)^   ```$", page, flags=re.DOTALL | re.MULTILINE)
+    return [textwrap.indent(textwrap.dedent(block), "    ") for block in blocks]
 
 
 @pytest.fixture
@@ -103,13 +111,20 @@ def test_an_effect_is_one_file_and_one_independent_law(copy: Path) -> None:
     run_tests(copy, "tests/unit/simulator/test_effects.py", "-k", "every_effect or null")
 
 
-def test_a_published_value_is_one_row(copy: Path) -> None:
-    table = copy / "impactcell" / "quantities.py"
-    text = table.read_text(encoding="utf-8")
-    end = ')\n"""Quantities that each cycle writes."""\n'
-    assert text.count(end) == 1
-    table.write_text(text.replace(end, QUANTITY), encoding="utf-8")
+def insert(path: Path, before: str, text: str) -> None:
+    source = path.read_text(encoding="utf-8")
+    assert source.count(before) == 1
+    path.write_text(source.replace(before, text + before), encoding="utf-8")
+
+
+def test_a_published_value_is_one_row_and_one_line_of_german(copy: Path) -> None:
+    row, german = blocks_of_the_page()
+    insert(copy / "impactcell" / "quantities.py", END, row)
     run(copy, "-m", "impactcell.scada.nodeset")
+    with pytest.raises(AssertionError, match=r"say it in impactcell/scada/german_descriptions\.py: mu_s by"):
+        run_tests(copy, LANGUAGES)
+    first = '    "Adds a comment to the condition."'
+    insert(copy / "impactcell" / "scada" / "german_descriptions.py", first, german)
     assert "CombinedFriction" in (copy / "impactcell/scada/model/ImpactCell.NodeSet2.xml").read_text(
         encoding="utf-8"
     )
@@ -125,6 +140,8 @@ def test_a_published_value_is_one_row(copy: Path) -> None:
         "-k",
         "not killed",
         "tests/unit/web/test_listed_values.py",
+        "impactcell/web/listed_values.py",
+        LANGUAGES,
     )
     shown = "from impactcell.web.listed_values import listed_values as of; print(of('de')['Model'][-1].title)"
     assert run(copy, "-c", shown) == "µs nach (6)\n"

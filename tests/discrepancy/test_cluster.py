@@ -1,5 +1,6 @@
 """The workflow on a dask cluster of two worker processes gives the same result to the byte."""
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -76,4 +77,11 @@ def test_no_scheduler_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr("impactcell.cli.cluster.ANSWER_S", 0.5)
     campaigns.write(make(shots=12), tmp_path / "campaign")
     with pytest.raises(DiscrepancyError, match="no dask scheduler"):
+        discrepancy(tmp_path / "campaign", tmp_path / "out", scheduler="tcp://127.0.0.1:1")
+
+
+def test_without_dask_the_way_to_it_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "impactcell.cli.cluster", None)
+    campaigns.write(make(shots=12), tmp_path / "campaign")
+    with pytest.raises(DiscrepancyError, match=r"pip install -e '\.\[cluster\]'` in the checkout"):
         discrepancy(tmp_path / "campaign", tmp_path / "out", scheduler="tcp://127.0.0.1:1")

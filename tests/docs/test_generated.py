@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from impactcell.alarms import RULES
+from impactcell.quantities import HISTORY
 from impactcell.settings import schema
 from tests.between_workers import computed_once
 
@@ -95,6 +96,8 @@ def test_every_key_of_a_cell_file_is_listed(pages: dict[str, str]) -> None:
 def test_nodes_and_conditions_are_listed(pages: dict[str, str]) -> None:
     for path in ("Friction/StaticFriction", "Wear/CyclesToLimitHigh", "Signature/TSquared", "StartBatch"):
         assert f"| `{path}` |" in pages["nodes.md"]
+    marked = re.findall(r"^\| `([^`]+)` \| variable \| \w+ \| yes \|", pages["nodes.md"], flags=re.MULTILINE)
+    assert sorted(marked) == sorted(HISTORY)
     assert "`Expected` (Boolean)" in pages["nodes.md"], "arguments of methods, with their types"
     for name, rule in RULES.items():
         assert f"| `{name}` | {rule.settings.severity} |" in pages["alarms.md"]

@@ -146,7 +146,7 @@ async def test_every_name_and_description_of_a_cell_is_there_in_german(here: Sit
                 empty.add((str(node.Identifier), attribute_id.name))
             if text.Text != CELL and LANGUAGES.text(text, "de").Locale != "de":
                 missing.add(text.Text)
-    assert not missing
+    assert not missing, "say it in impactcell/scada/german_descriptions.py: " + "; ".join(sorted(missing))
     assert not empty
 
 

@@ -1,4 +1,4 @@
-"""The alarm rules, one file each: a new one is a file here that holds a `RULE`, and a row in the docs.
+"""The alarm rules, one file each: a new one is a file here that holds a `RULE`.
 
 `RULES` has all of them by name, in the order in which conditions are listed.
 """

@@ -61,8 +61,11 @@ RULE = AlarmRule(
     node_number=5009,
     type_number=1004,
     title=Message("Batch shift", "Chargenwechsel"),
-    description="The material has changed: friction has shifted from one cycle to the next.",
-    settings=RuleSettings(severity=500, off_delay=50),
+    description=Message(
+        "The material has changed: friction has shifted from one cycle to the next.",
+        "Das Material hat gewechselt: die Reibung ist von einem Zyklus zum nächsten gesprungen.",
+    ),
+    settings=RuleSettings(severity=500, off_delay=50, told_step=0.0),
     input_node="Batch/Offset",
     evaluate=evaluate,
     suppressed_by_announcement=True,

@@ -62,8 +62,11 @@ RULE = AlarmRule(
     node_number=5010,
     type_number=1005,
     title=Message("Deviant cycle", "Abweichender Zyklus"),
-    description="The last cycle differs from the cycles the cell has learned.",
-    settings=RuleSettings(severity=400, off_delay=1),
+    description=Message(
+        "The last cycle differs from the cycles the cell has learned.",
+        "Der letzte Zyklus weicht von den gelernten ab.",
+    ),
+    settings=RuleSettings(severity=400, off_delay=1, told_step=0.0),
     input_node="Signature/TSquared",
     evaluate=evaluate,
     explained_by=(model_gap.NAME,),

@@ -22,8 +22,8 @@ RULE = AlarmRule(
     node_number=5014,
     type_number=1009,
     title=Message("Journal fault", "Journal gestört"),
-    description="Cycles cannot be stored.",
-    settings=RuleSettings(severity=900),
+    description=Message("Cycles cannot be stored.", "Zyklen können nicht gespeichert werden."),
+    settings=RuleSettings(severity=900, told_step=0.0),
     condition_class=ConditionClass.SYSTEM,
     logged_by_cause=True,
 )

@@ -72,7 +72,7 @@ RULE = AlarmRule(
     node_number=5012,
     type_number=1007,
     title=Message("Model gap", "Modelllücke"),
-    description="Measurements no longer fit the model.",
+    description=Message("Measurements no longer fit the model.", "Messungen passen nicht mehr zum Modell."),
     settings=RuleSettings(severity=300, off_delay=20, told_step=1.0),
     input_node="Model/Gap",
     evaluate=evaluate,

@@ -23,8 +23,11 @@ RULE = AlarmRule(
     node_number=5013,
     type_number=1008,
     title=Message("Positioning fault", "Positionierung gestört"),
-    description="A positioning task has stopped short of its target.",
-    settings=RuleSettings(severity=600),
+    description=Message(
+        "A positioning task has stopped short of its target.",
+        "Eine Positionieraufgabe endete vor ihrem Ziel.",
+    ),
+    settings=RuleSettings(severity=600, told_step=0.0),
     input_node="Positioning/Remaining",
 )
 """The rule."""

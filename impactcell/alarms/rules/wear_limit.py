@@ -61,7 +61,10 @@ RULE = AlarmRule(
     node_number=5008,
     type_number=1003,
     title=Message("Wear limit", "Verschleißgrenze"),
-    description="The filtered friction has probably passed the wear limit.",
+    description=Message(
+        "The filtered friction has probably passed the wear limit.",
+        "Die gefilterte Reibung hat wahrscheinlich die Verschleißgrenze überschritten.",
+    ),
     settings=RuleSettings(
         severity=700, on_delay=5, off_delay=20, activate_above=0.97, clear_below=0.5, told_step=1.0
     ),

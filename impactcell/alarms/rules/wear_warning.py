@@ -68,7 +68,10 @@ RULE = AlarmRule(
     node_number=5017,
     type_number=1010,
     title=Message("Wear warning", "Verschleißwarnung"),
-    description="The filtered friction will probably pass the wear limit soon.",
+    description=Message(
+        "The filtered friction will probably pass the wear limit soon.",
+        "Die gefilterte Reibung überschreitet wahrscheinlich bald die Verschleißgrenze.",
+    ),
     settings=RuleSettings(
         severity=350, on_delay=5, off_delay=20, activate_above=0.9, clear_below=0.5, told_step=1.0
     ),

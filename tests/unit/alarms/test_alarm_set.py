@@ -341,6 +341,32 @@ def test_an_active_alarm_is_told_anew_only_when_its_size_has_changed_by_the_agre
     assert told == [0.001 + 1e-4 * cycle for cycle in (6, 16, 26, 36)]
 
 
+def test_evidence_without_a_size_is_told_once():
+    """A rule by the how-to sent an event every cycle."""
+    state, told = NORMAL, set()
+    for cycle in range(1, 40):
+        result = RuleResult(WEAR, holds=True, evidence=Evidence(0.9 + 0.001 * cycle, 0.9))
+        state, _ = feed(state, result, cycle=cycle)
+        told |= {state.alarm(WEAR).evidence.statistic} if state.alarm(WEAR).active else set()
+    assert told == {0.9 + 0.001 * 6}
+
+
+@pytest.mark.parametrize(
+    "name", ["BatchShift", "DeviantCycle", "JournalFault", "ModuleConnection", "PositioningFault"]
+)
+def test_what_happens_anew_is_told_anew(name):
+    assert alarms.RULES[name].settings.told_step == 0.0
+
+
+def test_a_rule_may_say_its_own_rate_of_false_alarms():
+    """What a rule said of it was overwritten with what the cell wants of every rule."""
+    inputs = CycleInputs(7, wear(0.99), false_alarm_cycles=1e5, period_s=8.64)
+    assert judge(SETTINGS, NORMAL, inputs, WEAR).evidence.false_alarm_cycles == 1e5
+    own = Evidence(6.0, 5.0, 7, 0.01, 0.002, false_alarm_cycles=2e4)
+    result = judge(SETTINGS, NORMAL, replace(inputs, shift=own), BATCH)
+    assert result.evidence == replace(own, false_alarm_days=2.0)
+
+
 def test_every_batch_shift_is_told_while_the_last_one_still_stands():
     state, _ = feed(
         NORMAL, RuleResult(BATCH, holds=True, evidence=Evidence(12.0, 11.0, 1, 0.01, 0.1)), cycle=1

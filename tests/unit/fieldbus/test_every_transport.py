@@ -204,7 +204,7 @@ async def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request(
             await asyncio.sleep(0.1)
 
 
-@pytest.mark.parametrize("kind", ["tcp", "tls", "rtu_over_tcp", "rtu"])
+@pytest.mark.parametrize("kind", STREAMS)
 async def test_nobody_there_is_a_link_error(kind: str, tmp_path: Path) -> None:
     server, tls = server_for(kind, Image(), tmp_path)
     async with server:

@@ -1,5 +1,6 @@
 """What was committed is there, with its state; what was not has left no trace."""
 
+import contextlib
 import sqlite3
 from dataclasses import replace
 from pathlib import Path
@@ -7,12 +8,15 @@ from pathlib import Path
 import pytest
 
 from impactcell.errors import ForeignJournalError, JournalDamagedError, JournalError, JournalFullError
+from impactcell.journal import database, schema
 from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.checksums import row_crc
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.retention import FREE_SHARE, Retention
 from impactcell.journal.store import Journal
+from impactcell.quantities import BY_COLUMN
 from impactcell.records import Alarm, CycleId
+from impactcell.records.quantity import DataType
 from tests.snapshots import make_capture, make_snapshot
 
 
@@ -39,6 +43,23 @@ def test_cycle_capture_and_state_come_back_after_reopening(tmp_path: Path) -> No
         first, second = journal.captures()
         assert (first.cycle, second.cycle) == (1, 2)
         assert [capture.cycle for capture in journal.captures(2, 2)] == [2]
+
+
+def test_a_flag_of_a_cycle_comes_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A published Boolean with a column was a KeyError at the import of the journal."""
+    Journal(tmp_path / "j", "c").close()
+    flag = replace(BY_COLUMN["batch_id"], data_type=DataType.BOOLEAN, value=lambda s: s.cycle > 1)
+    monkeypatch.setattr(schema, "BY_COLUMN", {**BY_COLUMN, "flag": flag})
+    columns = schema._columns()
+    cells = tuple((c.name, schema._STORED_FORMS[c.sql_type], c.of) for c in columns)
+    monkeypatch.setattr(database, "COLUMNS", columns)
+    monkeypatch.setattr(schema, "_CELLS", cells)
+    with Journal(tmp_path / "j", "c") as journal:
+        append(journal, 1)
+        append(journal, 2)
+    with contextlib.closing(sqlite3.connect(tmp_path / "j")) as opened:
+        flags = [bool(value) for (value,) in opened.execute("SELECT flag FROM cycles ORDER BY seq")]
+    assert flags == [False, True]
 
 
 def test_a_cycle_is_stored_once(tmp_path: Path) -> None:

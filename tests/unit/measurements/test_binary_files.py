@@ -269,7 +269,9 @@ def test_a_missing_reader_is_told_with_the_way_out(tmp_path: Path, monkeypatch: 
     path = tmp_path / "a.parquet"
     path.write_bytes(b"PAR1" + bytes(20) + b"PAR1")
     monkeypatch.setitem(__import__("sys").modules, "pyarrow.parquet", None)
-    with pytest.raises(MeasurementError, match=r"pip install 'impactcell\[import\]'"):
+    with pytest.raises(
+        MeasurementError, match=r"run `\.venv/bin/pip install -e '\.\[import\]'` in the checkout, or"
+    ):
         read_tables(path)
 
 

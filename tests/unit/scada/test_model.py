@@ -1,15 +1,19 @@
 """The NodeSet2 file against the bindings of the code, by an XML parser that knows nothing of OPC UA."""
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 import impactcell
 from impactcell.alarms import RULES
-from impactcell.quantities import CYCLE, HISTORY, MODULE
-from impactcell.scada.nodeset import MODEL_FILE, nodeset
+from impactcell.quantities import BY_PATH, CYCLE, HISTORY, MODULE
+from impactcell.records.quantity import DataType
+from impactcell.scada import nodeset as of_nodes
+from impactcell.scada.nodeset import MODEL_FILE, next_free, nodeset
 
+GAP = BY_PATH["Model/Gap"]
 MODEL = Path(impactcell.__file__).parent / "scada" / "model"
 NS = "{http://opcfoundation.org/UA/2011/03/UANodeSet.xsd}"
 
@@ -63,6 +67,49 @@ def test_the_file_is_what_the_tables_say() -> None:
     assert MODEL_FILE.read_text(encoding="utf-8") == nodeset(), "run python -m impactcell.scada.nodeset"
 
 
+def test_every_number_has_one_node() -> None:
+    text = nodeset()
+    assert {number: names for number, names in of_nodes._names(text).items() if len(names) > 1} == {}
+    assert f"i={next_free(text, 6000)}" not in text
+
+
+@pytest.mark.parametrize(
+    ("number", "taken_by"),
+    [
+        (6092, "ImpactCellType/StartBatch/InputArguments"),
+        (6090, "ImpactCellType/Model/Gap/EURange"),
+        (5016, "ImpactCells"),
+        (1002, "ImpactCellAlarmType"),
+    ],
+)
+def test_a_number_that_is_taken_is_refused_by_name(
+    number: int, taken_by: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It made a file with two nodes of one NodeId, without a word."""
+    following = next_free(nodeset(), number)
+    value = replace(GAP, path="Model/Another", number=number, unit=None)
+    monkeypatch.setattr(of_nodes, "CYCLE", (*CYCLE, value))
+    with pytest.raises(SystemExit) as refused:
+        of_nodes._main()
+    told = str(refused.value.code)
+    assert told.startswith(f"{number} is taken by ")
+    assert taken_by in told
+    assert "ImpactCellType/Model/Another" in told
+    assert told.endswith(f"the next free number is {following}")
+    assert "Another" not in MODEL_FILE.read_text(encoding="utf-8")
+
+
+def test_a_value_with_a_unit_takes_three_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = next_free(nodeset(), 6000)
+    value = replace(GAP, path="Model/Another", number=first)
+    monkeypatch.setattr(of_nodes, "CYCLE", (*CYCLE, value))
+    assert next_free(nodeset(), 6000) == first + 3
+    more = replace(value, path="Model/More", number=first + 2)
+    monkeypatch.setattr(of_nodes, "CYCLE", (*CYCLE, value, more))
+    with pytest.raises(ValueError, match=rf"{first + 2} is taken by .*/Another/EngineeringUnits and by"):
+        nodeset()
+
+
 def test_every_condition_watches_what_is_published() -> None:
     watched = {rule.input_node for rule in RULES.values() if rule.input_node}
     assert watched <= {quantity.path for quantity in (*CYCLE, *MODULE)}
@@ -71,4 +118,5 @@ def test_every_condition_watches_what_is_published() -> None:
 def test_what_has_a_history_is_kept() -> None:
     for quantity in CYCLE:
         assert not quantity.has_history or (quantity.column and quantity.quality_column), quantity.path
+        assert not quantity.has_history or quantity.data_type is DataType.DOUBLE, quantity.path
         assert (quantity.unit is None) == (quantity.eu_range is None), quantity.path
