@@ -1,4 +1,8 @@
-"""A few cycles of the cell's own model before the first real one, so that all is compiled when it comes."""
+"""A few cycles of the cell's own model before the first real one, so that all is compiled when it comes.
+
+What only a change of the material or hundreds of cycles need is compiled while the first real ones come: on a
+new machine it takes ten seconds, in which the cycle that needs it would wait.
+"""
 
 import gc
 import threading
@@ -12,11 +16,20 @@ from impactcell.cell import CellDesign
 from impactcell.journal.capture_codec import encode_capture
 from impactcell.physics import TapInput, simulate_tap
 from impactcell.records import Capture, Channel, PositioningState, uniform_times
+from impactcell.tracking import wear_batch
+from impactcell.tracking.wear_batch import FrictionObservation, TrackerSettings, TrackerState
 
 CYCLES = 8
 """Cycles of warm-up: enough to learn a shortened signature and judge by it."""
 FORCE_HZ, POSITION_HZ = 100_000.0, 10_000.0
 """Sampling rates of the cycles of warm-up; any that show contact and slide."""
+
+SERIES = 800
+"""Estimates of friction that the tracker is given beside the first real cycles, ..."""
+CHANGES = {60: 0.05, 300: 0.012, 500: -0.03}
+"""... and cycles of it from which on they are higher by so much, ..."""
+ANNOUNCED, OUTLIER = 300, 30
+"""... one of which begins another batch, said to be one; and a cycle that is an outlier."""
 
 _lock = threading.Lock()
 _warm: set[tuple[object, ...]] = set()
@@ -36,6 +49,27 @@ def warm_up(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> Non
             # up a cycle for a tenth of a second now and then.
             gc.collect()
             gc.freeze()
+
+
+def warm_up_for_changes(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> None:
+    """Take a series with wear, changes and an outlier through the tracker, and forget it; as `warm_up`."""
+    kind = ("changes", design.tracker.batch)
+    with _lock:
+        if kind not in _warm and _run_series(design.tracker, stop):
+            _warm.add(kind)
+
+
+def _run_series(settings: TrackerSettings, stop: Callable[[], bool]) -> bool:
+    state, random = TrackerState(), np.random.default_rng(1)
+    for cycle in range(1, SERIES + 1):
+        if stop():
+            return False
+        change = sum(size for begin, size in CHANGES.items() if cycle >= begin)
+        mu_s = 0.2 + 1e-5 * cycle + change + 0.05 * (cycle == OUTLIER) + random.normal(0.0, 0.002)
+        batch = "second" if cycle >= ANNOUNCED else "first"
+        estimate = FrictionObservation(cycle, mu_s, 0.002, cycle * 10**9, batch)
+        state = wear_batch.update(settings, state, estimate).state
+    return True
 
 
 def _run_cycles(design: CellDesign, stop: Callable[[], bool]) -> bool:

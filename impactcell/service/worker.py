@@ -29,7 +29,7 @@ from impactcell.serialization.tree import Unknown
 from impactcell.service.guarded_step import guarded_step
 from impactcell.service.journal_writer import JournalWriter
 from impactcell.service.restoring import restored_state
-from impactcell.service.warmup import warm_up
+from impactcell.service.warmup import warm_up, warm_up_for_changes
 
 T = TypeVar("T")
 
@@ -117,7 +117,7 @@ class CellWorker:
         return self._journal_writer.take_events()
 
     async def warm_up(self) -> None:
-        """Compile what a cycle needs, so that the first one is not late.
+        """Compile what a cycle needs, so that the first one is not late; then what a change needs.
 
         It runs in a thread that nobody waits for: compiling cannot be interrupted, and must not hold up
         an end of the service.
@@ -129,8 +129,13 @@ class CellWorker:
                 warm_up(self._design, self._closing.is_set)
             except Exception:
                 self.log.exception("the warm-up failed; the first cycle will be slow")
-            if not self._closing.is_set():
-                loop.call_soon_threadsafe(transition.set)
+            if self._closing.is_set():
+                return
+            loop.call_soon_threadsafe(transition.set)
+            try:
+                warm_up_for_changes(self._design, self._closing.is_set)
+            except Exception:
+                self.log.exception("the warm-up failed; the first change will be slow")
 
         threading.Thread(target=work, name=f"warm-up-{self._design.name}", daemon=True).start()
         await transition.wait()
