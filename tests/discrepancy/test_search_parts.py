@@ -19,7 +19,9 @@ from impactcell.discrepancy.search import (
     residual_map,
     wild_bootstrap,
 )
+from impactcell.discrepancy.search.acceptance import accept_set
 from impactcell.discrepancy.search.conclusion import missing_shots
+from impactcell.discrepancy.search.indistinguishability import CandidateFit
 from impactcell.discrepancy.search.policy import POLICY
 
 
@@ -197,10 +199,41 @@ def test_mirrored_shots_tell_a_common_score_from_one_of_either_sign() -> None:
     assert tests.p_single[1:].min() < 0.2
 
 
-def test_effects_between_shots_alone_are_fitted_to_the_factors(monkeypatch: pytest.MonkeyPatch) -> None:
-    """And of these only those that the factors speak for, from where a start was found."""
-    p_values = {"friction_drift": 0.001, "batch_shift": 0.9, "surface_tilt": 0.001, "stiction_ageing": 0.001}
+@pytest.mark.parametrize(("spread", "tied"), [(0.012, ("surface_tilt",)), (0.06, ())])
+def test_a_rival_that_leaves_the_factors_wider_is_told_apart_though_a_few_shots_make_the_difference(
+    spread: float, tied: tuple[str, ...]
+) -> None:
+    """Friction by direction was tied with a stiffness that left the factors six times as wide."""
+
+    def candidate(effect: str, spread: float, each: list[float]) -> Any:
+        fit = SimpleNamespace(
+            effects=(effect,), coordinates=(), theta=(), spread=spread, misfit=lambda _: np.full(20, 50.0)
+        )
+        return CandidateFit(fit, np.array(each))
+
+    sets = [candidate("direction_asymmetry", 0.01, [0.0] * 20)]
+    sets.append(candidate("surface_tilt", spread, [-6.0] * 3 + [0.0] * 17))
+    nominal: Any = SimpleNamespace(
+        fit=SimpleNamespace(effects=()), candidate_scan=SimpleNamespace(p_value_of=lambda _: 0.001)
+    )
+    problem: Any = SimpleNamespace(count=20, shots=None, sizes=np.full(20, 50))
+    found = accept_set(problem, (nominal, nominal), sets, [], [], ())
+    assert found.ties == {"direction_asymmetry": tied}
+
+
+def test_effects_that_the_factors_speak_for_are_fitted_with_those_within_shots_that_no_fit_has_yet(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of the former only those, of the latter all, from where a start was found; and none by themselves."""
+    p_values = {
+        "friction_drift": 0.001,
+        "hertz_contact": 0.9,
+        "batch_shift": 0.9,
+        "surface_tilt": 0.001,
+        "stiction_ageing": 0.001,
+    }
     starts = {"friction_drift": (np.zeros(1),), "surface_tilt": (np.zeros(1),), "batch_shift": (np.zeros(1),)}
+    starts["hertz_contact"] = (np.ones(1),)
     fit = SimpleNamespace(effects=("viscous_friction",))
     scan = SimpleNamespace(
         gains=lambda: dict.fromkeys(p_values, 1.0),
@@ -217,5 +250,12 @@ def test_effects_between_shots_alone_are_fitted_to_the_factors(monkeypatch: pyte
     monkeypatch.setattr(between_shots, "run_tasks", lambda _, tasks: tasks)
     context: Any = SimpleNamespace(problem=SimpleNamespace(with_effects=lambda effects: effects))
     evidence: Any = SimpleNamespace(candidate_scan=scan)
-    (task,) = between_shots._fits(context, evidence)
-    assert (task.problem, task.starts) == (("viscous_friction", "friction_drift"), starts["friction_drift"])
+    tasks = between_shots._fits(context, evidence, {"hertz_contact"})
+    assert [task.problem for task in tasks] == [
+        ("viscous_friction", "friction_drift"),
+        ("viscous_friction", "surface_tilt"),
+    ]
+    assert [task.starts for task in tasks] == [starts["friction_drift"], starts["surface_tilt"]]
+    assert len(between_shots._fits(context, evidence, ())) == 3
+    p_values["friction_drift"] = p_values["stiction_ageing"] = 0.9
+    assert between_shots._fits(context, evidence, ()) == []

@@ -15,6 +15,7 @@ from impactcell.discrepancy.search.indistinguishability import (
     CandidateFit,
     are_indistinguishable,
     compare_fits,
+    widest_rival,
 )
 from impactcell.discrepancy.search.policy import POLICY
 
@@ -127,7 +128,8 @@ def accept_set(
 ) -> SelectionResult:
     """Accept the likeliest set of effects, each with those that the shots do not tell from it in its place.
 
-    A shape that was fitted to the end of its range is no name.
+    One that leaves the friction factors clearly wider is told from it by these, even where a few shots make
+    most of what their likelihoods differ by. A shape that was fitted to the end of its range is no name.
 
     Parameters
     ----------
@@ -151,7 +153,8 @@ def accept_set(
     new_effects = best.effects[len(nominal.fit.effects) :]
     added = tuple(sorted(new_effects, key=lambda effect: place.get(effect, len(place))))
     ties: dict[str, tuple[str, ...]] = dict.fromkeys(added, ())
-    for rival in sets[1:]:
+    limit = widest_rival(best.spread, problem.count)
+    for rival in (one for one in sets[1:] if one.fit.spread <= limit):
         instead = set(rival.fit.effects) - set(best.effects)
         if len(instead) == 1 and are_indistinguishable(problem, sets[0], rival):
             (replaced,) = set(best.effects) - set(rival.fit.effects)

@@ -20,7 +20,7 @@ from impactcell.discrepancy.search.acceptance import SelectionResult
 from impactcell.discrepancy.search.candidate_fits import FitTask, run_tasks
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.evidence import ALPHA, ModelEvidence
-from impactcell.discrepancy.search.indistinguishability import CandidateFit, compare_fits
+from impactcell.discrepancy.search.indistinguishability import CandidateFit, compare_fits, widest_rival
 from impactcell.discrepancy.search.model_error import shared_error
 from impactcell.discrepancy.search.policy import POLICY
 from impactcell.physics import Kind
@@ -109,12 +109,6 @@ def factor_rivals(best: Fit, fitted: Sequence[Fit], shots: int) -> tuple[str, ..
         return None
     limit = widest_rival(best.spread, shots)
     return tuple(fit.effects[-1] for fit in fitted if fit is not best and fit.spread <= limit)
-
-
-def widest_rival(spread: float, shots: int) -> float:
-    """Spread of the factors up to which a rival is not told from a model that leaves `spread`."""
-    limit: float = spread * float(fisher.ppf(POLICY.rival_probability, shots, shots)) ** 0.5
-    return limit
 
 
 def acts_between_shots(model: Fit) -> bool:

@@ -9,9 +9,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import f as fisher
 
 from impactcell.discrepancy.data import IndexArray
 from impactcell.discrepancy.model import Fit, Problem, linearise, unmet_gradient
+from impactcell.discrepancy.search.policy import POLICY
 from impactcell.records import Samples
 
 MAX_DEVIATION = 2.2
@@ -108,6 +110,12 @@ def are_indistinguishable(problem: Problem, best: CandidateFit, other: Candidate
     return gap < NEGLIGIBLE_DIFFERENCE or (
         gap <= MAX_DEVIATION * std and gap < DECISIVE_DIFFERENCE * dispersion
     )
+
+
+def widest_rival(spread: float, shots: int) -> float:
+    """Spread of the factors up to which a rival is not told from a model that leaves `spread`."""
+    limit: float = spread * float(fisher.ppf(POLICY.rival_probability, shots, shots)) ** 0.5
+    return limit
 
 
 def total_log_likelihood(problem: Problem, model: Fit) -> float:
