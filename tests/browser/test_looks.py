@@ -1,0 +1,65 @@
+"""How parts of the page look with its own sheet: what is pressed can be read, what is long fits."""
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import impactcell.web
+from tests.browser.chromium import DESK, Browser
+
+pytestmark = pytest.mark.browser
+
+SHEET = Path(impactcell.web.__file__).parent / "static" / "page.css"
+LOAD = """
+    const [sheet, theme, html] = arguments;
+    document.documentElement.dataset.theme = theme;
+    document.head.append(Object.assign(document.createElement("style"), { textContent: sheet }));
+    const viewport = { name: "viewport", content: "width=device-width, initial-scale=1" };
+    document.head.append(Object.assign(document.createElement("meta"), viewport));
+    document.body.innerHTML = html;
+"""
+COLOURS = """
+    const style = getComputedStyle(document.querySelector(arguments[0]));
+    return [style.color, style.backgroundColor].map((text) => text.match(/[0-9.]+/g).slice(0, 3).map(Number));
+"""
+
+
+def show(browser: Browser, html: str, theme: str = "light", size: tuple[int, int] = DESK) -> None:
+    browser.open("about:blank")
+    browser.show_as(theme, size)
+    browser.run(LOAD, SHEET.read_text(), theme, html)
+
+
+def contrast(one: list[float], other: list[float]) -> float:
+    """Give the contrast ratio of two colours, 0 to 255 (WCAG 2.2, relative luminance)."""
+
+    def luminance(colour: list[float]) -> float:
+        shares = (channel / 255 for channel in colour)
+        linear = [v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in shares]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    dark, light = sorted((luminance(one), luminance(other)))
+    return (light + 0.05) / (dark + 0.05)
+
+
+@contextlib.contextmanager
+def under_the_pointer(browser: Browser, css: str) -> Iterator[None]:
+    ask = browser.driver.execute_cdp_cmd
+    ask("DOM.enable", {})
+    ask("CSS.enable", {})
+    root = ask("DOM.getDocument", {})["root"]["nodeId"]
+    node = ask("DOM.querySelector", {"nodeId": root, "selector": css})["nodeId"]
+    ask("CSS.forcePseudoState", {"nodeId": node, "forcedPseudoClasses": ["hover"]})
+    yield
+    ask("CSS.disable", {})
+    ask("DOM.disable", {})
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("pressed", ["true", "false"])
+def test_a_button_under_the_pointer_can_be_read(browser: Browser, theme: str, pressed: str) -> None:
+    show(browser, f'<button class="quiet" aria-pressed="{pressed}">Hour</button>', theme)
+    with under_the_pointer(browser, "button"):
+        assert contrast(*browser.run(COLOURS, "button")) >= 4.5
