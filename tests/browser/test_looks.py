@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import impactcell.web
-from tests.browser.chromium import DESK, Browser
+from tests.browser.chromium import DESK, PHONE, Browser
 
 pytestmark = pytest.mark.browser
 
@@ -63,3 +63,23 @@ def test_a_button_under_the_pointer_can_be_read(browser: Browser, theme: str, pr
     show(browser, f'<button class="quiet" aria-pressed="{pressed}">Hour</button>', theme)
     with under_the_pointer(browser, "button"):
         assert contrast(*browser.run(COLOURS, "button")) >= 4.5
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_a_table_that_is_stacked_on_a_phone_scrolls_nothing(browser: Browser, language: str) -> None:
+    headings = {
+        "en": ("Time", "Cell", "Alarm", "State", "Reason", "Comment"),
+        "de": ("Zeit", "Zelle", "Alarm", "Zustand", "Grund", "Kommentar"),
+    }[language]
+    head = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
+    row = "".join(f'<td data-label="{heading}">short</td>' for heading in headings)
+    table = f'<table class="stack"><thead><tr>{head}</tr></thead><tbody><tr>{row}</tr></tbody></table>'
+    show(
+        browser,
+        f'<main><section class="panel"><div class="scroll">{table}</div></section></main>',
+        size=PHONE,
+    )
+    wide, room = browser.run(
+        "const s = document.querySelector('.scroll'); return [s.scrollWidth, s.clientWidth]"
+    )
+    assert wide <= room
