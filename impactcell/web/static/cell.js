@@ -7,7 +7,7 @@ const root = document.querySelector(".cell"), cell = root.dataset.cell;
 const edges = [{ colour: "band", width: 1 }, { colour: "band", width: 1 }];
 const tapSeries = [...edges, { colour: "curve", width: 1.5 }, { colour: "curve", width: 1.5 }];
 const place = (id) => document.getElementById(id);
-let limit = null, span = "hour", lastTrend = 0, charts = null, waiting = null;
+let limit = null, past = null, span = "hour", lastTrend = 0, charts = null, waiting = null;
 
 function makeCharts() {
   return {
@@ -52,7 +52,10 @@ function showCard(card) {
   showState(root, card);
   if (!hasCycle(card)) return;
   const reasons = card.reasons[document.documentElement.lang];
-  limit = values["Wear/Limit"];
+  if (limit !== values["Wear/Limit"]) {
+    limit = values["Wear/Limit"];
+    drawTrend();
+  }
   showFriction(root, card);
   showValues(root, card);
   const offset = values["Batch/Offset"], std = values["Batch/OffsetStdDev"], gap = values["Model/Gap"];
@@ -78,7 +81,12 @@ async function loadTrend() {
   if (!answer || asked !== span) return;
   if (answer.status === 404) return charts.trend.clear(texts.no_past);
   if (!answer.ok) return;
-  const past = await answer.json();
+  past = await answer.json();
+  drawTrend();
+}
+
+function drawTrend() {
+  if (!past) return;
   if (!past.time_ms.length) return charts.trend.clear(texts.no_trend);
   const marks = past.batches.map(([ms, id]) => ({ x: ms / 1e3, text: id, colour: "soft" }));
   if (limit !== null) marks.push({ y: limit, text: texts.limit, colour: "bad", dashed: true });
