@@ -84,6 +84,5 @@ def tour(content: Mapping[str, Any]) -> tuple[TourStop, ...]:
             f"Ein neuer Effekt wirkt: {', '.join(map(german_effect, entry['effects']))}.",
         )
         stops.append(TourStop(entry["from_cycle"], what, APPEARANCE))
-    last = max((stop.cycle for stop in stops), default=1)
     yours = Message("Your turn.", "Jetzt Sie.")
-    return (*sorted(stops, key=lambda stop: stop.cycle), TourStop(last, yours, MEASUREMENTS))
+    return (*sorted(stops, key=lambda stop: stop.cycle or 0), TourStop(None, yours, MEASUREMENTS))
