@@ -52,6 +52,11 @@ def _weight(entry: str) -> float:
         return 0.0
 
 
+def _told_decimals(std: float) -> int:
+    """Count the decimals that two significant digits of what is told of a standard deviation need."""
+    return max(1 - int(f"{TOLD_STDS * std:.1e}".partition("e")[2]), 0)
+
+
 class Messages:
     """The texts of one language: `messages["alarms"]`; those of the alarms are their rules' own."""
 
@@ -157,7 +162,16 @@ class Messages:
         '0.0020'
         """
         told = TOLD_STDS * std
-        text = f"{told:#.2g}" if told < LEAST_WHOLE else self.number(told, 2)
+        text = f"{told:.{_told_decimals(std)}f}" if told < LEAST_WHOLE else self.number(told, 2)
+        return text.replace(".", ",") if self.language == "de" else text
+
+    def beside_std(self, value: float, std: float) -> str:
+        """Write a value with as many decimals as stand behind its "±".
+
+        >>> Messages("de").beside_std(0.56, 0.00055)
+        '0,5600'
+        """
+        text = f"{value:.{_told_decimals(std)}f}"
         return text.replace(".", ",") if self.language == "de" else text
 
     def for_script(self) -> dict[str, str]:

@@ -1,7 +1,7 @@
 // One cell in depth: its last tap, its trend, its signature.
 import { Chart } from "./charts.js";
 import { moment } from "./frame.js";
-import { TOLD_STDS, coefficient, follow, hasCycle, number, set, showAlarm, showFriction, showState, showValues, texts, toldStd, withUnit } from "./live.js";
+import { TOLD_STDS, beside, coefficient, follow, hasCycle, number, set, showAlarm, showFriction, showState, showValues, texts, toldStd, withUnit } from "./live.js";
 
 const root = document.querySelector(".cell"), cell = root.dataset.cell;
 const edges = [{ colour: "band", width: 1 }, { colour: "band", width: 1 }];
@@ -61,7 +61,7 @@ function showCard(card) {
   const offset = values["Batch/Offset"], std = values["Batch/OffsetStdDev"], gap = values["Model/Gap"];
   const said = {
     cycle_time: moment(card.time_ms),
-    batch_offset: offset === null ? "" : `${coefficient(offset)}${std === null ? "" : ` ${toldStd(std)}`} ${texts.batch_offset}`,
+    batch_offset: offset === null ? "" : `${std === null ? coefficient(offset) : `${beside(std, offset)} ${toldStd(std)}`} ${texts.batch_offset}`,
     estimator: texts[card.estimator],
     mass: withUnit(card.mass, "kg"),
     signature_reason: reasons.signature,

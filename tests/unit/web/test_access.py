@@ -301,7 +301,7 @@ async def test_what_stands_behind_plus_minus_is_said_where_it_is_read(page: Page
     await put(page, CellNews(CELL, alarms=(raised(evidence=Evidence(12.0, 11.0, 4, 0.01, 0.002)),)))
     async with page.logged_in(Role.OBSERVER) as client:
         alarms = (await client.get("/alarms?lang=de")).text
-        assert "Größe 0,01 ± 0,0040" in alarms
+        assert "Größe 0,0100 ± 0,0040" in alarms
         for path in ("/", f"/cells/{CELL}", "/alarms"):
             text = (await client.get(path)).text
             assert f'data-told-stds="{TOLD_STDS}"' in text

@@ -205,7 +205,7 @@ async def test_friction_of_each_shot(page: Page, verbs: Verbs) -> None:
         expected = {"mean": statistics.mean(values), "spread": statistics.stdev(values), "n": len(values)}
         assert found.result["mu_s"] == pytest.approx(expected, rel=1e-6)
         text = (await client.get(f"/studies/{study}")).text
-        assert "<td>0.22</td>" in text
+        assert "<td>0.2200</td>" in text
         assert "<td>0.0020</td>" in text, "two standard deviations behind ±; the file has one"
         assert "µs 0.3183 is outside the calibrated" in text
         assert "200/249 shots are shown" in text
