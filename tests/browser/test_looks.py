@@ -83,3 +83,12 @@ def test_a_table_that_is_stacked_on_a_phone_scrolls_nothing(browser: Browser, la
         "const s = document.querySelector('.scroll'); return [s.scrollWidth, s.clientWidth]"
     )
     assert wide <= room
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_lines_of_a_chart_stand_out(browser: Browser, theme: str) -> None:
+    names = ("edge", "curve", "bad")
+    place = 'style="color: var(--%s); background: var(--panel)"'
+    boxes = "".join(f'<p class="{name}" {place % name}>line</p>' for name in names)
+    show(browser, boxes, theme)
+    assert all(contrast(*browser.run(COLOURS, f"p.{name}")) >= 3.0 for name in names)

@@ -4,7 +4,8 @@ import { moment } from "./frame.js";
 import { TOLD_STDS, beside, coefficient, follow, hasCycle, number, set, showAlarm, showFriction, showState, showValues, texts, toldStd, withUnit } from "./live.js";
 
 const root = document.querySelector(".cell"), cell = root.dataset.cell;
-const edges = [{ colour: "band", width: 1 }, { colour: "band", width: 1 }];
+// A band of one value at each x is nothing but its edges.
+const edges = [{ colour: "edge", width: 1.5 }, { colour: "edge", width: 1.5 }];
 const tapSeries = [...edges, { colour: "curve", width: 1.5 }, { colour: "curve", width: 1.5 }];
 const place = (id) => document.getElementById(id);
 let limit = null, past = null, span = "hour", lastTrend = 0, charts = null, waiting = null;
