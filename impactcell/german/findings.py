@@ -58,7 +58,7 @@ ENGLISH_STEPS: Final = {
     "import": "reading the files",
     "estimate": "estimating friction",
     "discrepancy": "looking for what the model misses",
-    "model accept": "foretelling what accepting would change",
+    "model accept": "predicting what accepting would change",
 }
 """Steps whose own name is that of a command."""
 

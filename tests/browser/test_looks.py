@@ -1,6 +1,7 @@
 """How parts of the page look with its own sheet: what is pressed can be read, what is long fits."""
 
 import contextlib
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,7 +12,8 @@ from tests.browser.chromium import DESK, PHONE, Browser
 
 pytestmark = pytest.mark.browser
 
-SHEET = Path(impactcell.web.__file__).parent / "static" / "page.css"
+WEB = Path(impactcell.web.__file__).parent
+SHEET, COLUMNS = WEB / "static" / "page.css", WEB / "templates" / "_study_columns.html.j2"
 LOAD = """
     const [sheet, theme, html] = arguments;
     document.documentElement.dataset.theme = theme;
@@ -83,6 +85,20 @@ def test_a_table_that_is_stacked_on_a_phone_scrolls_nothing(browser: Browser, la
         "const s = document.querySelector('.scroll'); return [s.scrollWidth, s.clientWidth]"
     )
     assert wide <= room
+
+
+@pytest.mark.parametrize("size", [DESK, PHONE], ids=str)
+def test_an_example_in_a_field_is_not_clipped(browser: Browser, size: tuple[int, int]) -> None:
+    examples = re.findall(r'\("\w+", "([^"]+)"\)', COLUMNS.read_text())
+    assert "3000 mm/min" in examples
+    fields = "".join(f'<label class="short">Unit<input value="{example}"></label>' for example in examples)
+    show(
+        browser, f'<main><section class="panel"><form class="act">{fields}</form></section></main>', size=size
+    )
+    clipped = (
+        "return [...document.querySelectorAll('input')].filter((i) => i.scrollWidth > i.clientWidth).length"
+    )
+    assert browser.run(clipped) == 0
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
