@@ -18,6 +18,7 @@ from impactcell.german.parameters import parameter_words
 from impactcell.records import Alarm
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.texts import CATALOGUE, LANGUAGES
+from impactcell.web.texts.import_faults import page_fault
 from impactcell.web.texts.import_notes import page_note
 from impactcell.web.texts.reasons import english_reason, german_reason
 
@@ -139,6 +140,10 @@ class Messages:
     def note(self, note: str) -> tuple[str, str]:
         """Say what was noted of dropped files, after the language in which it is said."""
         return page_note(note, self.language)
+
+    def fault(self, fault: str) -> tuple[str, str]:
+        """Say why dropped files cannot be read, after the language in which it is said."""
+        return page_fault(fault, self.language)
 
     def step(self, name: str) -> str:
         """Name a step of a study."""

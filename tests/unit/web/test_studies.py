@@ -228,7 +228,10 @@ async def test_faults_of_a_verb_are_shown_with_their_rows(page: Page, verbs: Ver
         await client.post(f"/studies/{study}/read", data={"csrf": await csrf_of(client)})
         await until(page, study, Stage.CONFIRMING)
         text = (await client.get(f"/studies/{study}")).text
-        assert "<li>run.csv:2: &#39;x&#39; is no number</li>" in text
+        assert '<li lang="en">run.csv:2: &#39;x&#39; is no number</li>' in text
+        assert ">not readable yet</span>" in text
+        assert 'name="set.rate"' in text
+        assert ">noch nicht lesbar</td>" in (await client.get("/studies?lang=de")).text
         assert "&lt;b&gt;&amp;&lt;/b&gt;" in text
         assert "<code>&lt;a&gt;</code>" in text
         assert 'name="unit.&lt;a&gt;"' in text
