@@ -160,6 +160,17 @@ class Messages:
             text = f"{float(text):.0f}"
         return text.replace(".", ",") if self.language == "de" else text
 
+    def size(self, length: int) -> str:
+        """Write the length of a file.
+
+        >>> [Messages("de").size(length) for length in (12, 4321, 999_999, 1_250_000)]
+        ['12 B', '4,3 kB', '1 MB', '1,2 MB']
+        """
+        if length < 1000:
+            return f"{length} B"
+        in_kb = float(f"{length / 1e3:.2g}")
+        return f"{self.number(in_kb, 2)} kB" if in_kb < 1000.0 else f"{self.number(length / 1e6, 2)} MB"
+
     def told_std(self, std: float) -> str:
         """Write what stands behind a "±", to two significant digits, also where the second is a 0.
 

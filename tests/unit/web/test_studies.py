@@ -230,6 +230,7 @@ async def test_faults_of_a_verb_are_shown_with_their_rows(page: Page, verbs: Ver
         text = (await client.get(f"/studies/{study}")).text
         assert '<li lang="en">run.csv:2: &#39;x&#39; is no number</li>' in text
         assert ">not readable yet</span>" in text
+        assert "run.csv (8 B)" in text
         assert 'name="set.rate"' in text
         assert ">noch nicht lesbar</td>" in (await client.get("/studies?lang=de")).text
         assert "&lt;b&gt;&amp;&lt;/b&gt;" in text
@@ -465,7 +466,7 @@ async def test_many_files_are_folded(page: Page) -> None:
         study.files = {"tap-0.csv": 115_000}
         one = (await client.get(f"/studies/{study.id}?lang=de")).text
     assert '<details class="help"><summary>27 Dateien, 3,1 MB</summary>tap-0.csv, tap-1.csv, ' in many
-    assert "tap-0.csv (0,12 MB)" in one
+    assert "tap-0.csv (120 kB)" in one
     assert "Dateien, " not in one
 
 
