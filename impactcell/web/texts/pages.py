@@ -186,7 +186,7 @@ PAGE_TEXTS: Texts = {
     "restarts": ("Module restarts", "Neustarts des Moduls"),
     "journal": ("Journal", "Journal"),
     "no_journal": ("none: nothing is kept over a restart", "keins: ein Neustart vergisst alles"),
-    "journal_ok": ("is written", "wird geschrieben"),
+    "journal_ok": ("being written", "wird geschrieben"),
     "opc_ua": ("OPC UA", "OPC UA"),
     "users": ("Users", "Benutzer"),
     "role": ("Role", "Rolle"),
@@ -197,14 +197,14 @@ PAGE_TEXTS: Texts = {
         "Clients that tried to connect. Compare the thumbprint with the client's own before you trust it.",
         "Clients, die sich verbinden wollten. Vor dem Vertrauen den Fingerabdruck vergleichen.",
     ),
-    "no_certificates": ("None waits.", "Keines wartet."),
+    "no_certificates": ("None waiting.", "Keines wartet."),
     "valid_until": ("valid until", "gültig bis"),
     "trust": ("Trust", "Vertrauen"),
     "engineers_only": (
         "Users and certificates are shown to engineers.",
         "Benutzer und Zertifikate sehen Ingenieure.",
     ),
-    "viewers": ("Open pages", "Offene Seiten"),
+    "viewers": ("Pages with live values", "Seiten mit Live-Werten"),
     "version": ("Version", "Version"),
 }  # fmt: skip
 """By key, in the order of `LANGUAGES`."""

@@ -354,6 +354,21 @@ async def test_every_page_counts_the_open_alarms(page: Page, path: str) -> None:
         assert 'id="open-alarms" hidden>' in (await client.get(path)).text
 
 
+async def test_the_navigation_says_where_one_is_and_leads_back(page: Page) -> None:
+    study = page.studies.store.begin("rail", "otto", CELL)
+    for path, current, back in (
+        ("/", '<a href="/" aria-current="page">Cells</a>', ""),
+        (f"/cells/{CELL}", '<a href="/" aria-current="true">Cells</a>', '<p><a href="/">Cells</a></p>'),
+        (f"/studies/{study.id}", '<a href="/studies" aria-current="true">Measurements</a>', ""),
+    ):
+        async with page.logged_in(Role.OBSERVER) as client:
+            text = (await client.get(path)).text
+        navigation = text[text.index("<nav") : text.index("</nav>")]
+        assert current in navigation
+        assert navigation.count("aria-current") == 1
+        assert back in text
+
+
 async def test_a_cell_that_places_nothing_shows_no_positioning(page: Page) -> None:
     async with page.logged_in(Role.OBSERVER) as client:
         assert "<h2>Positioning</h2>" not in (await client.get(f"/cells/{CELL}")).text
