@@ -21,7 +21,7 @@ def whole_alarms(alarms: Sequence[Alarm], *, wide: bool) -> RenderableType:
         table.add_column(heading, no_wrap=True)
     table.add_column("message", ratio=1)
     for alarm in shown:
-        table.add_row(_name(alarm), _state(alarm), str(alarm.cycle), alarm.message)
+        table.add_row(_name(alarm), _state(alarm), str(alarm.cycle), _message(alarm))
     return table
 
 
@@ -47,11 +47,16 @@ def _needing_a_look(alarms: Sequence[Alarm]) -> list[Alarm]:
 
 
 def _line(alarm: Alarm) -> Text:
-    return Text.assemble(_name(alarm), f" {_state(alarm)} since cycle {alarm.cycle}: {alarm.message}")
+    return Text.assemble(_name(alarm), f" {_state(alarm)} since cycle {alarm.cycle}: {_message(alarm)}")
 
 
 def _name(alarm: Alarm) -> Text:
     return Text(alarm.name, style="bold red" if alarm.active else "yellow")
+
+
+def _message(alarm: Alarm) -> str:
+    """Give what an alarm says; of one that has cleared, as what it said."""
+    return alarm.message if alarm.active else f"it said: {alarm.message}"
 
 
 def _state(alarm: Alarm) -> str:

@@ -74,10 +74,11 @@ class Messages:
         return RULES[alarm].title.text(self.language)
 
     def reason(self, alarm: Alarm) -> str:
-        """Say why an alarm came; of one that has not come, why it is watched or not."""
+        """Say why an alarm came, or had come; of one that has not come, why it is watched or not."""
         if not alarm.message:
             return self["suppressed_why" if alarm.suppressed else "watched_again"] if alarm.enabled else ""
-        return Message(alarm.message, alarm.message_de or alarm.message).text(self.language)
+        message = Message(alarm.message, alarm.message_de or alarm.message).text(self.language)
+        return message if alarm.active else f"{self['it_said']} {message}"
 
     def compared(self, alarm: Alarm) -> str:
         """Say what an alarm compared with what, a probability in per cent; empty for one without figures."""

@@ -36,7 +36,7 @@ def load(browser: Browser, language: str) -> None:
     code = SCRIPT.read_text().replace("export ", "")
     texts = Messages(language).for_script()
     browser.open("about:blank")
-    offered = "Object.assign(window, { showValues, cyclesLeft });"
+    offered = "Object.assign(window, { showValues, cyclesLeft, showAlarm });"
     browser.run(LOAD, f"{code}\n{offered}", language, json.dumps(texts), TOLD_STDS)
 
 
@@ -78,3 +78,24 @@ def test_cycles_that_are_left_are_whole_ones_and_the_same_everywhere(browser: Br
     assert said == "1234 (from 987 to 12,345)"
     for path, part in (("", "1234"), ("Low", "987"), ("High", "12,345")):
         assert browser.run(SHOW, f"Wear/CyclesToLimit{path}", "cycles", content) == part
+
+
+@pytest.mark.parametrize(
+    ("language", "said"),
+    [
+        ("en", "▲ Deviant cycle (not acknowledged): cleared; it said: friction is off"),
+        ("de", "▲ Abweichender Zyklus (nicht quittiert): vorbei; gemeldet war: Reibung passt nicht"),
+    ],
+)
+def test_an_alarm_that_has_cleared_says_what_it_said(browser: Browser, language: str, said: str) -> None:
+    load(browser, language)
+    script = """
+        const alarm = { name: "DeviantCycle", active: false, acknowledged: false, enabled: true, time_ms: 1 };
+        const evidence = { compared: {}, size: null, change_cycle: null };
+        Object.assign(alarm, { shelved: "unshelved", evidence });
+        alarm.message = { en: "friction is off", de: "Reibung passt nicht" };
+        const place = document.createElement("div");
+        showAlarm(place, [alarm], "");
+        return place.textContent;
+    """
+    assert browser.run(script) == said

@@ -89,7 +89,7 @@ export function showFriction(root, card) {
   set(root, "batch", values["Batch/BatchId"] || "–");
 }
 
-/** The alarm that matters most: open before over, then the latest. */
+/** The alarm that matters most: open before cleared, then the latest. */
 export function lastAlarm(alarms) {
   const told = alarms.filter((alarm) => alarm.time_ms > 0 && alarm.message.en);
   const rank = (alarm) => (alarm.active ? 2 : 0) + (alarm.acknowledged ? 0 : 1);
@@ -105,11 +105,17 @@ export function evidence(alarm) {
   return parts.join(", ");
 }
 
+/** What an alarm says, or said before it cleared. */
+function reason(alarm) {
+  const message = alarm.message[language] || alarm.message.en;
+  return alarm.active ? message : `${texts.cleared} ${message}`;
+}
+
 export function showAlarm(place, alarms, emptyText) {
   const alarm = lastAlarm(alarms);
   const open = alarm && isOpen(alarm);
   place.classList.toggle("is-open", Boolean(open));
-  const lines = alarm ? [`${open ? "▲ " : "○ "}${texts[alarm.name]}${alarm.acknowledged ? "" : ` (${texts.acknowledge})`}: ${alarm.message[language] || alarm.message.en}`, evidence(alarm)] : [emptyText];
+  const lines = alarm ? [`${open ? "▲ " : "○ "}${texts[alarm.name]}${alarm.acknowledged ? "" : ` (${texts.acknowledge})`}: ${reason(alarm)}`, evidence(alarm)] : [emptyText];
   place.replaceChildren(...lines.filter(Boolean).map((line, index) => {
     const paragraph = document.createElement("p");
     if (index) paragraph.className = "help";

@@ -28,6 +28,7 @@ SCRIPT_TEXTS: Texts = {
     "live_to": ("to", "bis"),
     "live_acknowledge": ("not acknowledged", "nicht quittiert"),
     "live_batch_offset": ("against the first batch", "gegenüber der ersten Charge"),
+    "live_cleared": ("cleared; it said:", "vorbei; gemeldet war:"),
     "live_since_cycle": ("since cycle", "seit Zyklus"),
     "live_in_cycles": ("cycles to go:", "Zyklen bis dahin:"),
     "live_size": ("size", "Größe"),

@@ -97,6 +97,8 @@ def test_many_alarms_push_nothing_out(width: int, height: int) -> None:
     names = [alarm.name for alarm in (*alarms[2:], *alarms[:2])]
     places = [text.find(name) for name in names if name in text]
     assert places == sorted(places)
+    assert "WearLimit cleared, unacknowledged since cycle 21: it said: by" in text or height < 60
+    assert "ModelGap active, unacknowledged since cycle 21: by" in text or height < 60
     told = [place for place, line in enumerate(lines) if "since cycle 21" in line]
     if len(told) < len(alarms):
         assert f"+{len(alarms) - len(told)} more: " in lines[-2] or f"{len(alarms)} alarms: " in lines[-2]

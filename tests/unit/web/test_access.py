@@ -369,6 +369,19 @@ async def test_the_navigation_says_where_one_is_and_leads_back(page: Page) -> No
         assert back in text
 
 
+@pytest.mark.parametrize(
+    ("language", "said"), [("en", "It said: friction is off"), ("de", "Gemeldet war: Reibung passt nicht")]
+)
+async def test_what_an_alarm_said_is_past_once_it_has_cleared(page: Page, language: str, said: str) -> None:
+    for active in (True, False):
+        alarm = replace(raised(message_de="Reibung passt nicht"), active=active)
+        await put(page, CellNews(CELL, alarms=(alarm,)))
+        async with page.logged_in(Role.OBSERVER) as client:
+            text = (await client.get(f"/alarms?lang={language}")).text
+        assert (f"<p>{said}</p>" in text) is not active
+        assert ("○ cleared<" in text) is (language == "en" and not active)
+
+
 async def test_a_cell_that_places_nothing_shows_no_positioning(page: Page) -> None:
     async with page.logged_in(Role.OBSERVER) as client:
         assert "<h2>Positioning</h2>" not in (await client.get(f"/cells/{CELL}")).text
