@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from impactcell.alarms.rules import model_gap
+from impactcell.demo.scenario_setup import TOUR_OVER
 from impactcell.records import Snapshot
 from impactcell.settings import CellConfig
 
@@ -42,7 +43,7 @@ class AutoTeach:
         gap = next(alarm for alarm in snapshot.alarms if alarm.name == model_gap.NAME)
         if self._accepted:
             if not gap.active:
-                self._say("the gap alarm has cleared: the extended model explains the captures")
+                self._say(f"the gap alarm has cleared, the extended model explains the captures; {TOUR_OVER}")
             return
         if gap.active and self._since is None:
             self._since = gap.evidence.change_cycle

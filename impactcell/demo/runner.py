@@ -177,8 +177,8 @@ class _DemoRun:
     def scene(self) -> Scene:
         """Return what the live view shows now."""
         last = self.snapshots[-1].cycle if self.snapshots else 0
-        happened = sorted([*self.setup.story, *self.messages], key=lambda entry: entry[0])
-        messages = [text for cycle, text in happened if cycle <= last]
+        told = [*self.setup.story, *self.messages, *self.setup.tour_end]
+        messages = [text for cycle, text in sorted(told, key=lambda entry: entry[0]) if cycle <= last]
         who = f"user {USER}, password {self.setup.password}"
         link = "connected" if self._status is None or self._status.connected else "not connected"
         return Scene(

@@ -3,8 +3,19 @@
 import socket
 
 import pytest
+import yaml
 
-from impactcell.demo.scenario_setup import customary_port, fit_events, story
+from impactcell.demo.scenario_setup import (
+    CONFIG,
+    SCENARIOS,
+    TOUR_OVER,
+    customary_port,
+    fit_events,
+    story,
+    tour_end,
+)
+from simulator.process import strike_conditions
+from simulator.scenario import read_scenario
 
 
 def test_a_batch_that_the_plc_keeps_to_itself_is_told_as_such() -> None:
@@ -18,6 +29,25 @@ def test_a_batch_that_the_plc_keeps_to_itself_is_told_as_such() -> None:
         (40, "batch B is on the table"),
         (90, "batch C is on the table, and the PLC says nothing of it"),
     )
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_a_demo_says_when_its_tour_is_over(scenario: str) -> None:
+    content = yaml.safe_load((CONFIG / "sim" / f"{scenario}.yaml").read_text(encoding="utf-8"))
+    said = tour_end(content)
+    if scenario == "demo":
+        assert said == ((131, TOUR_OVER),)
+        assert max(cycle for cycle, _ in story(content)) == 90
+    else:  # a last part ends the one, a new model the other
+        assert said == ()
+
+
+def test_a_demo_that_nobody_ends_keeps_a_friction_that_its_model_knows() -> None:
+    scenario = read_scenario(CONFIG / "sim" / "demo.yaml")
+    model = yaml.safe_load((CONFIG / "models" / "prototype.yaml").read_text(encoding="utf-8"))
+    low, high = model["predictors"][0]["mu_s_range"]
+    for cycle in (200, 2_000, 100_000):
+        assert low < strike_conditions(scenario, cycle, 0.0, 1).plant.mu_s < high
 
 
 @pytest.mark.parametrize(("cycles", "begins"), [(None, [1, 40, 90]), (50, [1, 20, 45]), (1, [1, 2, 3])])
