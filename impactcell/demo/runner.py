@@ -62,8 +62,6 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
     KeyboardInterrupt
         After the summary, where Ctrl-C ended it.
     """
-    if sys.stderr.isatty() and not is_quiet():
-        sys.stderr.write("setting up\n")
     # Until the event loop takes the signal over, an end has to pass through `set_up_scenario`: it cleans up.
     signal.signal(signal.SIGTERM, _end)
     with set_up_scenario(scenario, cycles) as setup:

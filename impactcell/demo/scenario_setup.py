@@ -17,6 +17,8 @@ import yaml
 
 from impactcell.demo.tour import tour
 from impactcell.errors import ImpactCellError, SettingsError
+from impactcell.process.console import is_quiet
+from impactcell.process.progress import named_steps
 from impactcell.process.shipped import ROOT, shipped_config
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
@@ -93,7 +95,9 @@ def set_up_scenario(scenario: str, cycles: int | None) -> Iterator[DemoSetup]:
         played.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
         password = secrets.token_urlsafe(9)
         write_users(directory / "users.yaml", {USER: with_password(User(USER, Role.ENGINEER), password)})
-        warm_up(cell_design(read_cell(CONFIG / "cells" / f"{scenario}.yaml")))
+        with contextlib.nullcontext(lambda _: None) if is_quiet() else named_steps() as begin_step:
+            begin_step("setting up")
+            warm_up(cell_design(read_cell(CONFIG / "cells" / f"{scenario}.yaml")))
         with (
             _simulator(played) as module_port,
             customary_port(PREFERRED_PORT) as opcua_port,

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from impactcell.demo.alarm_lines import alarms_within, whole_alarms
 from impactcell.demo.chart import LEGEND, QUALITY_STYLE, chart
-from impactcell.records import Estimator, Snapshot
+from impactcell.records import Coefficient, Estimator, Snapshot
 from impactcell.records.uncertainty import plus_minus
 
 WIDE = 100
@@ -92,7 +92,7 @@ def _facts(last: Snapshot, *, wide: bool, rows: int | None = None) -> Table:
     friction = last.friction
     left_column: list[tuple[str, str | Text]] = [
         ("mu_s", _coefficient(last)),
-        ("mu_k", _plus_minus(friction.mu_k.value, friction.mu_k.std)),
+        ("mu_k", _value(friction.mu_k)),
         ("peak force", _measured(friction.peak_force_n, "N", 1)),
         ("slid", _measured(friction.sliding_distance_m * 1e6, "µm", 0)),
     ]
@@ -127,13 +127,19 @@ def _plus_minus(value: float, std: float) -> str:
     return plus_minus(value, std, f".{decimals}f") if math.isfinite(std) else f"{value:.4f}"
 
 
+def _value(coefficient: Coefficient) -> str:
+    """Show a coefficient; where there is none, why."""
+    said = _plus_minus(coefficient.value, coefficient.std)
+    return f"{said}: {coefficient.reason}" if math.isnan(coefficient.value) and coefficient.reason else said
+
+
 def _measured(value: float, unit: str, decimals: int) -> str:
     return f"{value:.{decimals}f} {unit}" if math.isfinite(value) else "none"
 
 
 def _coefficient(snapshot: Snapshot) -> Text:
     mu_s = snapshot.friction.mu_s
-    text = Text(_plus_minus(mu_s.value, mu_s.std), style=QUALITY_STYLE[mu_s.quality])
+    text = Text(_value(mu_s), style=QUALITY_STYLE[mu_s.quality])
     by = snapshot.friction.estimator
     return text if by is Estimator.NONE else text.append(f"  by {by.value}", style="dim")
 

@@ -42,7 +42,7 @@ GERMAN_STEPS: Final = {
     "estimate": "Reibung schätzen",
     "discrepancy": "Abweichung suchen",
     "model accept": "Vorhersagen, was das Annehmen ändert",
-    COMPILING: "Übersetzen für diesen Rechner, einmal: etwa eine Minute, auf einem langsamen länger",
+    COMPILING: "Übersetzen für diesen Rechner, einmal: ein bis zwei Minuten, auf einem langsamen länger",
     "fitting the nominal model": "Modell anpassen",
     "locating the gap and naming effects": "Abweichung orten und Effekte nennen",
     "holding names against free forms": "Namen gegen freie Formen halten",

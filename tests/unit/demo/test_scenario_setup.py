@@ -1,10 +1,13 @@
 """The demo tells what its scenario does, and what the cell has to find out by itself."""
 
+import contextlib
+import logging
 import socket
 
 import pytest
 import yaml
 
+from impactcell.demo import scenario_setup
 from impactcell.demo.scenario_setup import (
     CONFIG,
     SCENARIOS,
@@ -29,6 +32,22 @@ def test_a_batch_that_the_plc_keeps_to_itself_is_told_as_such() -> None:
         (40, "batch B is on the table"),
         (90, "batch C is on the table, and the PLC says nothing of it"),
     )
+
+
+def test_what_compiles_is_a_step_that_shows_how_long_it_takes(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    begun: list[str] = []
+
+    def compile_for_long(*_: object) -> None:
+        assert begun == ["setting up"]
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(scenario_setup, "warm_up", compile_for_long)
+    monkeypatch.setattr(scenario_setup, "named_steps", lambda: contextlib.nullcontext(begun.append))
+    caplog.set_level(logging.INFO, "impactcell")
+    with pytest.raises(KeyboardInterrupt), scenario_setup.set_up_scenario("demo", None):
+        pass
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)

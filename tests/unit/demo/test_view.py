@@ -168,7 +168,7 @@ def test_nothing_known_is_drawn_as_such() -> None:
     )
     text = drawn([blank])
     assert "no usable estimate yet" in text
-    assert "none" in text
+    assert "none: clipped" in text
     assert "nan" not in text
     assert "by none" not in text
 
