@@ -9,6 +9,7 @@ from pathlib import Path
 
 from impactcell.alarms.rules import model_gap
 from impactcell.demo.scenario_setup import TOUR_OVER
+from impactcell.physics.effect_names import in_words
 from impactcell.records import Snapshot
 from impactcell.settings import CellConfig
 
@@ -69,7 +70,7 @@ class AutoTeach:
             await self._run("export", str(journal.file), "-o", str(shots), *between)
             await self._run("discrepancy", str(shots), "--cell", str(path), "-o", str(results))
             result = json.loads((results / "result.json").read_text(encoding="utf-8"))
-            named = ", ".join(effect["effect"] for effect in result["effects"]) or "nothing"
+            named = ", ".join(in_words(effect["effect"]) for effect in result["effects"]) or "nothing"
             held_out = result["gap"]["held_out"]
             gaps = f"held-out gap {held_out['before']} before, {held_out['after']} after"
             verdict = f"{result['verdict']}: {named}; {gaps}"

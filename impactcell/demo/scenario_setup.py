@@ -17,6 +17,7 @@ import yaml
 
 from impactcell.demo.tour import tour
 from impactcell.errors import ImpactCellError, SettingsError
+from impactcell.physics.effect_names import in_words
 from impactcell.process.console import is_quiet
 from impactcell.process.progress import named_steps
 from impactcell.process.shipped import ROOT, shipped_config
@@ -151,7 +152,7 @@ def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-ar
         for deviation in content.get("deviations", [])
     ]
     events += [
-        (entry["from_cycle"], f"a new effect acts in the plant: {', '.join(entry['effects'])}")
+        (entry["from_cycle"], f"a new effect acts in the plant: {', '.join(map(in_words, entry['effects']))}")
         for entry in content.get("appearances", [])
     ]
     return tuple(sorted(events))

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from impactcell.german.open_loop import german_open_loop_sentence
 from impactcell.physics.effect import German
+from impactcell.physics.effect_names import in_words
 from impactcell.physics.effects import LIBRARY
 from impactcell.process.progress import COMPILING
 
@@ -70,7 +71,7 @@ def german_effect(identifier: str) -> str:
     ('Viskose Reibung', 'own effect')
     """
     german = german_texts(identifier)
-    return identifier.replace("_", " ") if german is None else german.name
+    return in_words(identifier) if german is None else german.name
 
 
 def german_texts(identifier: str) -> German | None:

@@ -15,6 +15,7 @@ from impactcell.german.findings import (
     german_texts,
 )
 from impactcell.german.parameters import parameter_words
+from impactcell.physics.effect_names import as_title, in_words
 from impactcell.records import Alarm
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.texts import CATALOGUE, LANGUAGES
@@ -111,7 +112,7 @@ class Messages:
 
     def effect(self, identifier: str) -> str:
         """Name an effect."""
-        return german_effect(identifier) if self.language == "de" else identifier.replace("_", " ")
+        return german_effect(identifier) if self.language == "de" else in_words(identifier)
 
     def parameter(self, effect: str, name: str) -> tuple[str, str]:
         """Give words and unit of an effect's parameter."""
@@ -125,7 +126,7 @@ class Messages:
         """
         effect, _, own = name.rpartition(".")
         words, unit = self.parameter(effect, own)
-        said = f"{self.effect(effect)}: {words}" if effect else words
+        said = f"{as_title(self.effect(effect))}: {words}" if effect else words
         return f"{said} [{unit}]" if unit else said
 
     def advice(self, effect: Mapping[str, Any]) -> tuple[str, str]:

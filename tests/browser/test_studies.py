@@ -105,7 +105,7 @@ async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Brows
         browser.find('button[value="discrepancy"]').click()
         browser.find('[data-effect="stribeck_friction"]', COMPILING_S)
         browser.until(
-            lambda: "Missing: stribeck friction" in browser.text_within("iframe.report"), "the report"
+            lambda: "Missing: Stribeck friction" in browser.text_within("iframe.report"), "the report"
         )
         named_s = time.monotonic() - begun
         browser.find('[data-stage="done"]', COMPILING_S)  # what accepting it would change is told last

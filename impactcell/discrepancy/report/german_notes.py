@@ -10,6 +10,7 @@ from typing import Final
 
 from impactcell.discrepancy.report.german_words import phrase, term_name
 from impactcell.german.findings import with_decimal_commas
+from impactcell.physics.effect_names import identifier_of
 
 Patterns = Sequence[tuple[str, str | Callable[[re.Match[str]], str]]]
 """English as a pattern, and German as that is expanded; a function gives nothing where it knows no part."""
@@ -214,8 +215,8 @@ def _of(english: str, patterns: Patterns) -> str | None:
 
 
 def _terms(names: str) -> str:
-    return ", ".join(term_name(name.replace(" ", "_")) for name in names.split(", "))
+    return ", ".join(term_name(identifier_of(name)) for name in names.split(", "))
 
 
 def _quantities(english: str) -> str:
-    return " und ".join(phrase(name.replace(" ", "_")) for name in english.split(" and "))
+    return " und ".join(phrase(identifier_of(name)) for name in english.split(" and "))

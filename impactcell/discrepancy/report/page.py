@@ -14,6 +14,7 @@ from impactcell.discrepancy.search import ALPHA, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.german.findings import REPORTS
 from impactcell.german.parameters import parameter_words
+from impactcell.physics.effect_names import as_title
 from impactcell.physics.effects import LIBRARY
 from impactcell.records.uncertainty import TOLD_STDS
 
@@ -156,6 +157,7 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
         "seed": result.seed,
         "guide": EFFECT_GUIDE,
         "words": phrase,
+        "as_title": as_title,
         "setting": said.setting,
         "shape_in_words": said.shape,
     }

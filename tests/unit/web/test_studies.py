@@ -485,9 +485,9 @@ async def test_parameters_are_said_in_words_with_their_unit(page: Page) -> None:
         study.stage, study.result = Stage.DONE, RESULT | {"effects": [found, own]}
         study.changes = CHANGES | {"changes": changes}
         shown = {code: (await client.get(f"/studies/{study.id}?lang={code}")).text for code in ("en", "de")}
-    assert "</b> · stribeck velocity 0.04 m/s · friction increase 0.03" in shown["en"]
+    assert "</b> · Stribeck velocity 0.04 m/s · friction increase 0.03" in shown["en"]
     assert "</b> · Stribeck-Geschwindigkeit 0,04 m/s · Zunahme der Reibung 0,03" in shown["de"]
-    assert "own effect</b> · strength n per m 60" in shown["en"]
+    assert "Own effect</b> · strength n per m 60" in shown["en"]
     names = re.findall(r'<tr><td data-label="[^"]*">(.*?)</td>', shown["de"])
     assert names == ["µs", "Steifigkeit [N/m]", "Viskose Reibung: viskoser Koeffizient [N s/m]"]
 
