@@ -75,6 +75,10 @@ def test_both_are_whole_and_show_the_same_numbers(pages: dict[str, str]) -> None
         page.feed(text)
         assert page.open == []
         assert f'<html lang="{language}">' in text
+        assert "100 to 100 %" not in text
+        assert "100 bis 100 %" not in text
+        assert not re.search(r"e-0\d m\b", text)
+        assert " µm (" in text
     english, german = both["en"], both["de"]
     assert len(english.headings) == len(german.headings)
     assert english.pictures == german.pictures
