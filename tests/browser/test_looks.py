@@ -7,12 +7,14 @@ from pathlib import Path
 
 import pytest
 
+import impactcell.discrepancy.report
 import impactcell.web
 from tests.browser.chromium import DESK, PHONE, Browser
 
 pytestmark = pytest.mark.browser
 
 WEB = Path(impactcell.web.__file__).parent
+REPORT = Path(impactcell.discrepancy.report.__file__).parent / "templates" / "style.css"
 SHEET, COLUMNS = WEB / "static" / "page.css", WEB / "templates" / "_study_columns.html.j2"
 LOAD = """
     const [sheet, theme, html] = arguments;
@@ -28,10 +30,12 @@ COLOURS = """
 """
 
 
-def show(browser: Browser, html: str, theme: str = "light", size: tuple[int, int] = DESK) -> None:
+def show(
+    browser: Browser, html: str, theme: str = "light", size: tuple[int, int] = DESK, sheet: Path = SHEET
+) -> None:
     browser.open("about:blank")
     browser.show_as(theme, size)
-    browser.run(LOAD, SHEET.read_text(), theme, html)
+    browser.run(LOAD, sheet.read_text(), theme, html)
 
 
 def contrast(one: list[float], other: list[float]) -> float:
@@ -108,3 +112,28 @@ def test_lines_of_a_chart_stand_out(browser: Browser, theme: str) -> None:
     boxes = "".join(f'<p class="{name}" {place % name}>line</p>' for name in names)
     show(browser, boxes, theme)
     assert all(contrast(*browser.run(COLOURS, f"p.{name}")) >= 3.0 for name in names)
+
+
+def test_a_map_of_colours_stays_light_where_a_report_is_dark(browser: Browser) -> None:
+    curve, heat = (
+        "<div class='wide'><svg></svg></div>",
+        "<div class='maps'><figure><svg></svg></figure></div>",
+    )
+    show(browser, curve + heat, "dark", sheet=REPORT)
+    style = "return [...document.querySelectorAll('svg')].map((svg) => getComputedStyle(svg)[arguments[0]])"
+    assert browser.run(style, "filter") == ["invert(0.88) hue-rotate(180deg)", "none"]
+    assert browser.run(style, "backgroundColor")[1] == "rgb(255, 255, 255)"
+
+
+@pytest.mark.parametrize(("columns", "size", "hint"), [(5, PHONE, True), (2, PHONE, False), (5, DESK, False)])
+def test_a_wide_table_of_a_report_says_that_it_goes_on(
+    browser: Browser, columns: int, size: tuple[int, int], hint: bool
+) -> None:
+    table = f"<div class='wide'><table><tr>{'<th>Wahrscheinlichkeit</th>' * columns}</tr></table></div>"
+    show(browser, f"<main>{table}</main>", size=size, sheet=REPORT)
+    wide, room, content = browser.run(
+        "const box = document.querySelector('.wide');"
+        "return [box.scrollWidth, box.clientWidth, getComputedStyle(box, '::before').content]"
+    )
+    assert (wide > room) is hint
+    assert ("↔" in content) is hint
