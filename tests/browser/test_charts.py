@@ -92,6 +92,10 @@ def test_the_word_of_a_limit_stands_above_its_line_and_no_curve_runs_through_it(
     assert alone[1] == 0
     struck = ask(WORD, [1.0, 1.2, 1.1, 2.05, 2.1, 2.1], [LIMIT])
     assert struck[0] > 0.8 * alone[0], "a curve runs through the word"
+    charts.run("chart.element.style.height = '220px'")  # as high as that of a page, with a batch at its top
+    topmost = ask(WORD, [1.0, 1.2, 1.1, 1.2, 1.3, 1.4], [{"x": 0.1, "text": "A", "colour": "soft"}, LIMIT])
+    assert topmost[0] > 20
+    assert topmost[1] == 0
     batch = {"x": 4.9, "text": "batch C of the north hall", "colour": "soft"}
     beside = ask(WORD, [1.0, 1.2, 1.1, 1.2, 1.3, 1.4], [batch, LIMIT])
     assert beside[1] > 20, "the word stands on that of a batch"

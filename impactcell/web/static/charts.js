@@ -92,7 +92,8 @@ export class Chart {
       const values = [low, high, ...this.marks.map((mark) => mark.y)].filter((value) => Number.isFinite(value));
       if (!values.length) return [0, 1];
       const least = Math.min(...values), most = Math.max(...values), room = Math.max(most - least, 1e-9) * 0.08;
-      return [least - room, most + room];
+      const above = this.marks.some((mark) => mark.y === most) ? 2.5 * room : room; // for its word
+      return [least - room, most + above];
     };
     const options = {
       ...this.size(),
