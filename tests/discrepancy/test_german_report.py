@@ -181,6 +181,11 @@ def test_laws_of_a_machine_and_where_they_come_from_are_said_in_german() -> None
             ("de", ("Das Rauschen (Kraft) ist nicht angegeben; 0,312 ist aus benachbarten Messwerten "
                     "geschätzt, eine untere Schranke, wo es korreliert ist.")),
         ),
+        (
+            "The noise of position is not stated; 1.5 µm was estimated from neighbouring samples, which ...",
+            ("de", ("Das Rauschen (Position) ist nicht angegeben; 1,5 µm ist aus benachbarten Messwerten "
+                    "geschätzt, eine untere Schranke, wo es korreliert ist.")),
+        ),
         ("Shot 7 has a gap in time; what happened in it is lost.",
          ("de", "Stoß 7 hat eine Lücke in der Zeit; was darin geschah, ist verloren.")),
         ("Data, clipped: shot 2: the force stands at its upper end, 5.2, for 12 samples.",

@@ -68,7 +68,7 @@ def _data_fault(match: re.Match[str]) -> str:
 
 NOTES: Final[Patterns] = (
     (r"Data, ([^:]+): (?:shot (\d+): )?(.*?)(?:; the like in (\d+) more shots)?\.", _data_fault),
-    (r"The noise of (\w+) is not stated; (\S+) was estimated .*",
+    (r"The noise of (\w+) is not stated; (\S+(?: \S+)?) was estimated .*",
      lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus benachbarten Messwerten "
      "geschätzt, eine untere Schranke, wo es korreliert ist."),
     (r"The mass of shot (\d+) is not stated and is fitted, block by block\.",
