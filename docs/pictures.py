@@ -33,7 +33,7 @@ def live_view() -> None:
     """Run the demo to its end and draw what it shows then."""
     with set_up_scenario("demo", CYCLES) as setup:
         demo = _DemoRun(setup, CYCLES)
-        asyncio.run(demo.run(lambda _demo, _snapshot: None))
+        asyncio.run(demo.follow(lambda _demo, _snapshot: None))
         scene = demo.scene()
     # Who may connect is drawn anew for every demo.
     scene = replace(scene, endpoint=scene.endpoint.split(" · ")[0], link="connected")

@@ -52,7 +52,9 @@ def strike_conditions(scenario: Scenario, number: int, start_m: float, direction
     random = np.random.default_rng([scenario.seed, number])
     plant = scenario.plant
     batch = [entry for entry in scenario.batches if entry.from_cycle <= number][-1]
-    worn = scenario.wear.mu_s_per_1000_cycles * max(number - scenario.wear.from_cycle, 0) / 1000.0
+    wear = scenario.wear
+    last = number if wear.until_cycle is None else min(number, wear.until_cycle)
+    worn = wear.mu_s_per_1000_cycles * max(last - wear.from_cycle, 0) / 1000.0
     factor = 1.0 + scenario.scatter.friction * random.standard_normal()
     ratio = plant.ratio * (1.0 + scenario.scatter.ratio * random.standard_normal())
     effects: dict[str, Mapping[str, Parameter]] = dict(plant.effects)

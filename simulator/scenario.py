@@ -101,10 +101,11 @@ class Scatter(ScenarioModel):
 
 
 class Wear(ScenarioModel):
-    """Steady change of mu_s, mu_k following by the ratio."""
+    """Steady change of mu_s, mu_k following by the ratio; from `until_cycle` on it stays as it is."""
 
     mu_s_per_1000_cycles: float = 0.0
     from_cycle: Cycle = 1
+    until_cycle: Cycle | None = None
 
 
 class Batch(ScenarioModel):

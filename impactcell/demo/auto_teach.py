@@ -8,6 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from impactcell.alarms.rules import model_gap
+from impactcell.demo.scenario_setup import TOUR_OVER
+from impactcell.physics.effect_names import in_words
 from impactcell.records import Snapshot
 from impactcell.settings import CellConfig
 
@@ -42,7 +44,7 @@ class AutoTeach:
         gap = next(alarm for alarm in snapshot.alarms if alarm.name == model_gap.NAME)
         if self._accepted:
             if not gap.active:
-                self._say("the gap alarm has cleared: the extended model explains the captures")
+                self._say(f"the gap alarm has cleared, the extended model explains the captures; {TOUR_OVER}")
             return
         if gap.active and self._since is None:
             self._since = gap.evidence.change_cycle
@@ -68,7 +70,7 @@ class AutoTeach:
             await self._run("export", str(journal.file), "-o", str(shots), *between)
             await self._run("discrepancy", str(shots), "--cell", str(path), "-o", str(results))
             result = json.loads((results / "result.json").read_text(encoding="utf-8"))
-            named = ", ".join(effect["effect"] for effect in result["effects"]) or "nothing"
+            named = ", ".join(in_words(effect["effect"]) for effect in result["effects"]) or "nothing"
             held_out = result["gap"]["held_out"]
             gaps = f"held-out gap {held_out['before']} before, {held_out['after']} after"
             verdict = f"{result['verdict']}: {named}; {gaps}"

@@ -62,8 +62,6 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
     KeyboardInterrupt
         After the summary, where Ctrl-C ended it.
     """
-    if sys.stderr.isatty() and not is_quiet():
-        sys.stderr.write("setting up\n")
     # Until the event loop takes the signal over, an end has to pass through `set_up_scenario`: it cleans up.
     signal.signal(signal.SIGTERM, _end)
     with set_up_scenario(scenario, cycles) as setup:
@@ -177,8 +175,8 @@ class _DemoRun:
     def scene(self) -> Scene:
         """Return what the live view shows now."""
         last = self.snapshots[-1].cycle if self.snapshots else 0
-        happened = sorted([*self.setup.story, *self.messages], key=lambda entry: entry[0])
-        messages = [text for cycle, text in happened if cycle <= last]
+        told = [*self.setup.story, *self.messages, *self.setup.tour_end]
+        messages = [text for cycle, text in sorted(told, key=lambda entry: entry[0]) if cycle <= last]
         who = f"user {USER}, password {self.setup.password}"
         link = "connected" if self._status is None or self._status.connected else "not connected"
         return Scene(

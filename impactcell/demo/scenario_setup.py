@@ -17,6 +17,9 @@ import yaml
 
 from impactcell.demo.tour import tour
 from impactcell.errors import ImpactCellError, SettingsError
+from impactcell.physics.effect_names import in_words
+from impactcell.process.console import is_quiet
+from impactcell.process.progress import named_steps
 from impactcell.process.shipped import ROOT, shipped_config
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
@@ -30,6 +33,9 @@ CONFIG = shipped_config()
 SCENARIOS = ("demo", "new-effect", "positioning")
 USER = "demo"
 EVENT_SECTIONS = (("batches", "from_cycle"), ("deviations", "cycle"), ("appearances", "from_cycle"))
+TOUR_OVER = "that was the tour: acknowledge the alarms on the page, drop a measurement there; Ctrl-C ends"
+AFTERMATH_CYCLES = 40
+"""After the last event, in which what it does is found and can be looked at."""
 PREFERRED_PORT = 4840
 """Registered port of OPC UA (IANA)."""
 PREFERRED_PAGE_PORT = 8480
@@ -51,6 +57,8 @@ class DemoSetup:
         Where the last part should go; nan where cycles come without end.
     stops : tuple of TourStop
         The same as the page tells it.
+    tour_end : tuple of (int, str)
+        What is said once all has happened; empty where the demo finds the end itself.
     """
 
     cell: CellConfig
@@ -58,6 +66,7 @@ class DemoSetup:
     password: str
     last_target_m: float = math.nan
     stops: tuple[TourStop, ...] = ()
+    tour_end: tuple[tuple[int, str], ...] = ()
 
 
 @contextlib.contextmanager
@@ -87,14 +96,18 @@ def set_up_scenario(scenario: str, cycles: int | None) -> Iterator[DemoSetup]:
         played.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
         password = secrets.token_urlsafe(9)
         write_users(directory / "users.yaml", {USER: with_password(User(USER, Role.ENGINEER), password)})
-        warm_up(cell_design(read_cell(CONFIG / "cells" / f"{scenario}.yaml")))
+        with contextlib.nullcontext(lambda _: None) if is_quiet() else named_steps() as begin_step:
+            begin_step("setting up")
+            warm_up(cell_design(read_cell(CONFIG / "cells" / f"{scenario}.yaml")))
         with (
             _simulator(played) as module_port,
             customary_port(PREFERRED_PORT) as opcua_port,
             customary_port(PREFERRED_PAGE_PORT) as page_port,
         ):
             cell = read_cell(_write_cell_file(scenario, directory, module_port, opcua_port, page_port))
-            yield DemoSetup(cell, story(content), password, last_target_m(content), tour(content))
+            yield DemoSetup(
+                cell, story(content), password, last_target_m(content), tour(content), tour_end(content)
+            )
     finally:
         shutil.rmtree(directory, ignore_errors=True)
 
@@ -139,10 +152,18 @@ def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-ar
         for deviation in content.get("deviations", [])
     ]
     events += [
-        (entry["from_cycle"], f"a new effect acts in the plant: {', '.join(entry['effects'])}")
+        (entry["from_cycle"], f"a new effect acts in the plant: {', '.join(map(in_words, entry['effects']))}")
         for entry in content.get("appearances", [])
     ]
     return tuple(sorted(events))
+
+
+def tour_end(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-arg]
+    """Say from which cycle on the tour is over; nothing where a last part or a new model ends it."""
+    if content.get("positioning") or content.get("appearances"):
+        return ()
+    last = max((cycle for cycle, _ in story(content)), default=1)
+    return ((last + AFTERMATH_CYCLES + 1, TOUR_OVER),)
 
 
 def last_target_m(content: dict) -> float:  # type: ignore[type-arg]

@@ -5,6 +5,7 @@ from typing import Any
 
 from impactcell.alarms import Message
 from impactcell.german.findings import german_effect
+from impactcell.physics.effect_names import in_words
 from impactcell.web import TourStop
 
 WEAR = Message(
@@ -80,10 +81,9 @@ def tour(content: Mapping[str, Any]) -> tuple[TourStop, ...]:
         stops.append(TourStop(deviation["cycle"], what, DEVIATION))
     for entry in content.get("appearances", []):
         what = Message(
-            f"A new effect acts in the plant: {', '.join(entry['effects']).replace('_', ' ')}.",
+            f"A new effect acts in the plant: {', '.join(map(in_words, entry['effects']))}.",
             f"Ein neuer Effekt wirkt: {', '.join(map(german_effect, entry['effects']))}.",
         )
         stops.append(TourStop(entry["from_cycle"], what, APPEARANCE))
-    last = max((stop.cycle for stop in stops), default=1)
     yours = Message("Your turn.", "Jetzt Sie.")
-    return (*sorted(stops, key=lambda stop: stop.cycle), TourStop(last, yours, MEASUREMENTS))
+    return (*sorted(stops, key=lambda stop: stop.cycle or 0), TourStop(None, yours, MEASUREMENTS))

@@ -10,14 +10,19 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
+from impactcell.demo.alarm_lines import alarms_within, whole_alarms
 from impactcell.demo.chart import LEGEND, QUALITY_STYLE, chart
-from impactcell.records import Alarm, Estimator, Snapshot
+from impactcell.records import Coefficient, Estimator, Snapshot
 from impactcell.records.uncertainty import plus_minus
 
 WIDE = 100
 """Columns from which on facts stand side by side and alarms in a table."""
 LEAST_ROWS, MOST_ROWS = 4, 20
 """Of the chart; in a terminal too low for the least it is left out."""
+LEAST_ALARMS = 2
+"""Lines of alarms for whose sake a low terminal does without the chart."""
+BORDER = 2
+"""Lines of a frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,26 +60,39 @@ def render(scene: Scene, width: int = 100, height: int = 40) -> RenderableType:
             "on a new machine much is compiled before, which takes a minute or two"
         )
         return Panel(waiting, title=f"impactcell · {scene.cell}", width=width)
-    last = scene.snapshots[-1]
-    parts: list[RenderableType] = [Text(scene.story, style="italic"), _facts(last, wide=width >= WIDE)]
-    below: list[RenderableType] = [_alarms(last.alarms, wide=width >= WIDE)]
-    if scene.link:
-        below.append(Text(f"OPC UA: {scene.endpoint} · Ctrl-C ends", style="dim"))
+    last, wide = scene.snapshots[-1], width >= WIDE
     measure = Console(width=width - 4, file=io.StringIO())
-    rows_used = sum(len(measure.render_lines(part)) for part in (*parts, *below)) + 4
-    if height - rows_used >= LEAST_ROWS:
-        curve = chart(scene.snapshots, max(20, width - 16), min(height - rows_used, MOST_ROWS))
+
+    def lines(*parts: RenderableType) -> int:
+        return sum(len(measure.render_lines(part)) for part in parts)
+
+    within = height - BORDER
+    story, facts = Text(scene.story, style="italic"), _facts(last, wide=wide)
+    endpoint = [Text(f"OPC UA: {scene.endpoint} · Ctrl-C ends", style="dim")] if scene.link else []
+    if lines(story, *endpoint, facts) >= within:
+        story.no_wrap, story.overflow = True, "ellipsis"
+        facts = _facts(last, wide=wide, rows=max(within - lines(story, *endpoint) - 1, 1))
+    left = within - lines(story, *endpoint, facts)
+    beside_chart = left - LEAST_ROWS - BORDER
+    alarms = whole_alarms(last.alarms, wide=wide)
+    if lines(alarms) > (beside_chart if beside_chart >= LEAST_ALARMS else left):
+        alarms = alarms_within(last.alarms, beside_chart if beside_chart >= LEAST_ALARMS else left)
+    rows = min(left - lines(alarms) - BORDER, MOST_ROWS)
+    parts: list[RenderableType] = [story, *endpoint, facts]
+    if rows >= LEAST_ROWS:
+        curve = chart(scene.snapshots, max(20, width - 16), rows)
         parts.append(Panel(curve, title=LEGEND, title_align="left"))
     title = f"impactcell · {scene.cell} · cycle {last.cycle} · "
     title += f"module {scene.link}" if scene.link else "ended"
-    return Panel(Group(*parts, *below), title=title, width=width)
+    return Panel(Group(*parts, alarms), title=title, width=width)
 
 
-def _facts(last: Snapshot, *, wide: bool) -> Table:
+def _facts(last: Snapshot, *, wide: bool, rows: int | None = None) -> Table:
+    """Show what is known; in so many rows, if it is said, of which none wraps."""
     friction = last.friction
     left_column: list[tuple[str, str | Text]] = [
         ("mu_s", _coefficient(last)),
-        ("mu_k", _plus_minus(friction.mu_k.value, friction.mu_k.std)),
+        ("mu_k", _value(friction.mu_k)),
         ("peak force", _measured(friction.peak_force_n, "N", 1)),
         ("slid", _measured(friction.sliding_distance_m * 1e6, "µm", 0)),
     ]
@@ -91,14 +109,13 @@ def _facts(last: Snapshot, *, wide: bool) -> Table:
     facts = Table.grid(padding=(0, 2))
     for _ in range(2 if wide else 1):
         facts.add_column(style="dim", no_wrap=True)
-        facts.add_column()
+        facts.add_column(no_wrap=rows is not None, overflow="ellipsis")
     if wide:
-        for left_row, right_row in zip(left_column, right_column, strict=True):
+        for left_row, right_row in list(zip(left_column, right_column, strict=True))[:rows]:
             facts.add_row(*left_row, *right_row)
     else:
-        for name, value in left_column + right_column:
-            if name:
-                facts.add_row(name, value)
+        for name, value in [row for row in left_column + right_column if row[0]][:rows]:
+            facts.add_row(name, value)
     return facts
 
 
@@ -110,13 +127,19 @@ def _plus_minus(value: float, std: float) -> str:
     return plus_minus(value, std, f".{decimals}f") if math.isfinite(std) else f"{value:.4f}"
 
 
+def _value(coefficient: Coefficient) -> str:
+    """Show a coefficient; where there is none, why."""
+    said = _plus_minus(coefficient.value, coefficient.std)
+    return f"{said}: {coefficient.reason}" if math.isnan(coefficient.value) and coefficient.reason else said
+
+
 def _measured(value: float, unit: str, decimals: int) -> str:
     return f"{value:.{decimals}f} {unit}" if math.isfinite(value) else "none"
 
 
 def _coefficient(snapshot: Snapshot) -> Text:
     mu_s = snapshot.friction.mu_s
-    text = Text(_plus_minus(mu_s.value, mu_s.std), style=QUALITY_STYLE[mu_s.quality])
+    text = Text(_value(mu_s), style=QUALITY_STYLE[mu_s.quality])
     by = snapshot.friction.estimator
     return text if by is Estimator.NONE else text.append(f"  by {by.value}", style="dim")
 
@@ -165,28 +188,3 @@ def _signature(snapshot: Snapshot) -> Text:
     if math.isfinite(signature.deviates_at_m):
         text.append(f", odd at {signature.deviates_at_m * 1e3:.2f} mm", style="bold red")
     return text
-
-
-def _alarms(alarms: Sequence[Alarm], *, wide: bool) -> RenderableType:
-    visible = [alarm for alarm in alarms if alarm.active or not alarm.acknowledged]
-    if not visible:
-        return Text("no alarms", style="green")
-    rows = []
-    for alarm in visible:
-        state = ("active" if alarm.active else "cleared") + ("" if alarm.acknowledged else ", unacknowledged")
-        name = Text(alarm.name, style="bold red" if alarm.active else "yellow")
-        rows.append((name, state, str(alarm.cycle), alarm.message))
-    if not wide:
-        return Group(
-            *(
-                Text.assemble(name, f" {state} since cycle {cycle}: {message}")
-                for name, state, cycle, message in rows
-            )
-        )
-    table = Table(expand=True, box=None, header_style="dim", padding=(0, 2, 0, 0))
-    for heading in ("alarm", "state", "since cycle"):
-        table.add_column(heading, no_wrap=True)
-    table.add_column("message", ratio=1)
-    for row in rows:
-        table.add_row(*row)
-    return table

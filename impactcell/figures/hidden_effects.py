@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from impactcell.figures._style import COLOURS, GREY, PALE, write_figures
+from impactcell.physics.effect_names import in_words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,7 +38,7 @@ class ConditionCount:
     def label(self) -> str:
         """Name as it is drawn; the strength where it is not the default."""
         name, strength = self.condition.split("@")
-        words = name.replace("_", " ")
+        words = in_words(name)
         return words if strength == "1" else f"{words}, {strength}"
 
 

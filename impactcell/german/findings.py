@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from impactcell.german.open_loop import german_open_loop_sentence
 from impactcell.physics.effect import German
+from impactcell.physics.effect_names import in_words
 from impactcell.physics.effects import LIBRARY
 from impactcell.process.progress import COMPILING
 
@@ -42,7 +43,7 @@ GERMAN_STEPS: Final = {
     "estimate": "Reibung schätzen",
     "discrepancy": "Abweichung suchen",
     "model accept": "Vorhersagen, was das Annehmen ändert",
-    COMPILING: "Übersetzen für diesen Rechner, einmal: etwa eine Minute, auf einem langsamen länger",
+    COMPILING: "Übersetzen für diesen Rechner, einmal: ein bis zwei Minuten, auf einem langsamen länger",
     "fitting the nominal model": "Modell anpassen",
     "locating the gap and naming effects": "Abweichung orten und Effekte nennen",
     "holding names against free forms": "Namen gegen freie Formen halten",
@@ -58,7 +59,7 @@ ENGLISH_STEPS: Final = {
     "import": "reading the files",
     "estimate": "estimating friction",
     "discrepancy": "looking for what the model misses",
-    "model accept": "foretelling what accepting would change",
+    "model accept": "predicting what accepting would change",
 }
 """Steps whose own name is that of a command."""
 
@@ -70,7 +71,7 @@ def german_effect(identifier: str) -> str:
     ('Viskose Reibung', 'own effect')
     """
     german = german_texts(identifier)
-    return identifier.replace("_", " ") if german is None else german.name
+    return in_words(identifier) if german is None else german.name
 
 
 def german_texts(identifier: str) -> German | None:

@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from impactcell.physics.effect_names import in_words
 from impactcell.physics.effects import LIBRARY
 
 PLANT: Final = {
@@ -69,8 +70,7 @@ def words_of(name: str, language: str) -> str:
     stem, _, number = name.rpartition("_")
     if stem and number.isdigit():
         return f"{words_of(stem, language)} {number}"
-    words = name.replace("_", " ")
-    return GERMAN.get(words, words) if language == "de" else words
+    return GERMAN.get(name.replace("_", " "), in_words(name)) if language == "de" else in_words(name)
 
 
 def parameter_words(effect: str, name: str, language: str) -> tuple[str, str]:
@@ -79,7 +79,7 @@ def parameter_words(effect: str, name: str, language: str) -> tuple[str, str]:
     One of an effect that the library does not have keeps its whole name: nobody says what of it is a unit.
 
     >>> parameter_words("stribeck_friction", "stribeck_velocity_m_s", "en")
-    ('stribeck velocity', 'm/s')
+    ('Stribeck velocity', 'm/s')
     >>> parameter_words("", "damping_n_s_per_m", "de")
     ('Dämpfung', 'N s/m')
     """

@@ -12,7 +12,7 @@ LINES_VARIABLE: Final = "IMPACTCELL_STEPS"
 """Variable of the environment that asks for a line a step on standard error."""
 STEP_PREFIX: Final = "step: "
 """Begins such a line."""
-COMPILING: Final = "compiling for this machine, once: about a minute, longer on a slow or busy one"
+COMPILING: Final = "compiling for this machine, once: a minute or two, longer on a slow or busy one"
 """Said when machine code is missing, after an installation or an update."""
 
 

@@ -37,9 +37,12 @@ class CellNews:
 
 @dataclass(frozen=True, slots=True)
 class TourStop:
-    """Something that a demo has in store: from which cycle on, what happens, and where to look."""
+    """Something that a demo has in store: from which cycle on, what happens, and where to look.
 
-    cycle: int
+    What waits for the reader has no cycle (None): nobody but the reader knows when it is done.
+    """
+
+    cycle: int | None
     what: Message
     where: Message
 

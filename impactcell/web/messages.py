@@ -15,9 +15,11 @@ from impactcell.german.findings import (
     german_texts,
 )
 from impactcell.german.parameters import parameter_words
+from impactcell.physics.effect_names import as_title, in_words
 from impactcell.records import Alarm
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.texts import CATALOGUE, LANGUAGES
+from impactcell.web.texts.import_faults import page_fault
 from impactcell.web.texts.import_notes import page_note
 from impactcell.web.texts.reasons import english_reason, german_reason
 
@@ -52,6 +54,11 @@ def _weight(entry: str) -> float:
         return 0.0
 
 
+def _told_decimals(std: float) -> int:
+    """Count the decimals that two significant digits of what is told of a standard deviation need."""
+    return max(1 - int(f"{TOLD_STDS * std:.1e}".partition("e")[2]), 0)
+
+
 class Messages:
     """The texts of one language: `messages["alarms"]`; those of the alarms are their rules' own."""
 
@@ -68,10 +75,11 @@ class Messages:
         return RULES[alarm].title.text(self.language)
 
     def reason(self, alarm: Alarm) -> str:
-        """Say why an alarm came; of one that has not come, why it is watched or not."""
+        """Say why an alarm came, or had come; of one that has not come, why it is watched or not."""
         if not alarm.message:
             return self["suppressed_why" if alarm.suppressed else "watched_again"] if alarm.enabled else ""
-        return Message(alarm.message, alarm.message_de or alarm.message).text(self.language)
+        message = Message(alarm.message, alarm.message_de or alarm.message).text(self.language)
+        return message if alarm.active else f"{self['it_said']} {message}"
 
     def compared(self, alarm: Alarm) -> str:
         """Say what an alarm compared with what, a probability in per cent; empty for one without figures."""
@@ -104,7 +112,7 @@ class Messages:
 
     def effect(self, identifier: str) -> str:
         """Name an effect."""
-        return german_effect(identifier) if self.language == "de" else identifier.replace("_", " ")
+        return german_effect(identifier) if self.language == "de" else in_words(identifier)
 
     def parameter(self, effect: str, name: str) -> tuple[str, str]:
         """Give words and unit of an effect's parameter."""
@@ -118,7 +126,7 @@ class Messages:
         """
         effect, _, own = name.rpartition(".")
         words, unit = self.parameter(effect, own)
-        said = f"{self.effect(effect)}: {words}" if effect else words
+        said = f"{as_title(self.effect(effect))}: {words}" if effect else words
         return f"{said} [{unit}]" if unit else said
 
     def advice(self, effect: Mapping[str, Any]) -> tuple[str, str]:
@@ -135,6 +143,10 @@ class Messages:
         """Say what was noted of dropped files, after the language in which it is said."""
         return page_note(note, self.language)
 
+    def fault(self, fault: str) -> tuple[str, str]:
+        """Say why dropped files cannot be read, after the language in which it is said."""
+        return page_fault(fault, self.language)
+
     def step(self, name: str) -> str:
         """Name a step of a study."""
         return (GERMAN_STEPS if self.language == "de" else ENGLISH_STEPS).get(name, name)
@@ -150,6 +162,17 @@ class Messages:
             text = f"{float(text):.0f}"
         return text.replace(".", ",") if self.language == "de" else text
 
+    def size(self, length: int) -> str:
+        """Write the length of a file.
+
+        >>> [Messages("de").size(length) for length in (12, 4321, 999_999, 1_250_000)]
+        ['12 B', '4,3 kB', '1 MB', '1,2 MB']
+        """
+        if length < 1000:
+            return f"{length} B"
+        in_kb = float(f"{length / 1e3:.2g}")
+        return f"{self.number(in_kb, 2)} kB" if in_kb < 1000.0 else f"{self.number(length / 1e6, 2)} MB"
+
     def told_std(self, std: float) -> str:
         """Write what stands behind a "±", to two significant digits, also where the second is a 0.
 
@@ -157,7 +180,16 @@ class Messages:
         '0.0020'
         """
         told = TOLD_STDS * std
-        text = f"{told:#.2g}" if told < LEAST_WHOLE else self.number(told, 2)
+        text = f"{told:.{_told_decimals(std)}f}" if told < LEAST_WHOLE else self.number(told, 2)
+        return text.replace(".", ",") if self.language == "de" else text
+
+    def beside_std(self, value: float, std: float) -> str:
+        """Write a value with as many decimals as stand behind its "±".
+
+        >>> Messages("de").beside_std(0.56, 0.00055)
+        '0,5600'
+        """
+        text = f"{value:.{_told_decimals(std)}f}"
         return text.replace(".", ",") if self.language == "de" else text
 
     def for_script(self) -> dict[str, str]:

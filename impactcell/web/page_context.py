@@ -13,6 +13,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 
 from impactcell import __version__
+from impactcell.physics.effect_names import as_title
 from impactcell.records import Shelving
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.scada import Role
@@ -111,6 +112,7 @@ class PageContext:
             path=request.url.path,
             version=__version__,
             told_stds=TOLD_STDS,
+            as_title=as_title,
             static=f"/static/{STATIC_VERSION}",
             cells=self.content.cells,
             open_alarm_count=self._open_alarm_count() if session is not None else 0,

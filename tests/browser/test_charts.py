@@ -13,7 +13,8 @@ STATIC = Path(impactcell.web.__file__).parent / "static"
 LOAD = """
     const root = document.documentElement, script = document.createElement("script");
     root.lang = "en";
-    for (const [name, value] of Object.entries({ band: "#f00", curve: "#00f", soft: "#000", grid: "#fff" }))
+    const lines = { edge: "#800", curve: "#00f", bad: "#0a0", soft: "#000", grid: "#fff" };
+    for (const [name, value] of Object.entries({ ...lines, band: "#f00", panel: "#fff" }))
         root.style.setProperty(`--${name}`, value);
     script.textContent = arguments[0];
     document.head.append(script);
@@ -40,7 +41,8 @@ def without(value: float, *places: int) -> list[float | None]:
     return [None if x in places else value for x in range(9)]
 
 
-def test_a_band_breaks_off_where_either_edge_has_no_value(browser: Browser) -> None:
+@pytest.fixture
+def charts(browser: Browser) -> Browser:
     library, charts = (
         (STATIC / name).read_text() for name in ("vendor/uplot/uPlot.iife.min.js", "charts.js")
     )
@@ -48,6 +50,10 @@ def test_a_band_breaks_off_where_either_edge_has_no_value(browser: Browser) -> N
         LOAD,
         f"{library}; window.uPlot = uPlot;\n{charts.replace('export class', 'class')}; window.Chart = Chart;",
     )
+    return browser
+
+
+def test_a_band_breaks_off_where_either_edge_has_no_value(charts: Browser) -> None:
     for low, high, drawn in (
         ((), (), "########"),
         ((4,), (4,), "###--###"),
@@ -57,4 +63,39 @@ def test_a_band_breaks_off_where_either_edge_has_no_value(browser: Browser) -> N
         ((2,), (6,), "#--##--#"),
     ):
         edges = without(1.0, *low), without(2.0, *high)
-        assert browser.driver.execute_async_script(DRAW, *edges, without(1.2)) == drawn, (low, high)
+        assert charts.driver.execute_async_script(DRAW, *edges, without(1.2)) == drawn, (low, high)
+
+
+WORD = """
+    const [curve, marks, done] = arguments;
+    chart.show([curve.map((_, x) => x), curve, curve, curve], marks);
+    requestAnimationFrame(() => requestAnimationFrame(() => {
+        const { ctx, bbox } = chart.plot, y = Math.round(chart.plot.valToPos(2, "y", true));
+        const count = (top, height, is) => {
+            const { data } = ctx.getImageData(bbox.left, top, bbox.width, height);
+            const at = data.keys().filter((i) => i % 4 === 0);
+            return at.reduce((sum, i) => sum + is(data[i], data[i + 1], data[i + 2], data[i + 3]), 0);
+        };
+        const isGreen = (r, g, b, alpha) => g > 120 && r < 60 && b < 60 && alpha > 100;
+        const above = Math.max(y - 20, bbox.top);
+        done([count(above, y - 2 - above, isGreen), count(y + 3, 18, isGreen)]);
+    }));
+"""
+"""Counts what is drawn in the colour of a limit at 2, above its line and below."""
+LIMIT = {"y": 2, "text": "limit", "colour": "bad", "dashed": True}
+
+
+def test_the_word_of_a_limit_stands_above_its_line_and_no_curve_runs_through_it(charts: Browser) -> None:
+    ask = charts.driver.execute_async_script
+    alone = ask(WORD, [1.0, 1.2, 1.1, 1.2, 3.0, 1.0], [LIMIT])
+    assert alone[0] > 20
+    assert alone[1] == 0
+    struck = ask(WORD, [1.0, 1.2, 1.1, 2.05, 2.1, 2.1], [LIMIT])
+    assert struck[0] > 0.8 * alone[0], "a curve runs through the word"
+    charts.run("chart.element.style.height = '220px'")  # as high as that of a page, with a batch at its top
+    topmost = ask(WORD, [1.0, 1.2, 1.1, 1.2, 1.3, 1.4], [{"x": 0.1, "text": "A", "colour": "soft"}, LIMIT])
+    assert topmost[0] > 20
+    assert topmost[1] == 0
+    batch = {"x": 4.9, "text": "batch C of the north hall", "colour": "soft"}
+    beside = ask(WORD, [1.0, 1.2, 1.1, 1.2, 1.3, 1.4], [batch, LIMIT])
+    assert beside[1] > 20, "the word stands on that of a batch"

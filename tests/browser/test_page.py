@@ -203,6 +203,47 @@ async def test_every_page(
     await shop.beside(look)
 
 
+ONE_CARD = """
+    window.EventSource = class extends EventSource {
+        addEventListener(kind, take) {
+            if (kind !== "card") return super.addEventListener(kind, take);
+            const takeOnceDrawn = (event) => {
+                if (document.querySelector("#trend canvas")) take(event);
+                else setTimeout(() => takeOnceDrawn(event), 10);
+            };
+            super.addEventListener(kind, takeOnceDrawn, { once: true });
+        }
+    };
+"""
+"""Of the cards that the service sends a page takes only the first, and only once its trend is drawn."""
+LIMIT_IS_DRAWN = """
+    const canvas = document.querySelector("#trend canvas");
+    if (!canvas) return false;
+    const bad = getComputedStyle(document.documentElement).getPropertyValue("--bad").trim();
+    const [red, green, blue] = [1, 3, 5].map((at) => parseInt(bad.slice(at, at + 2), 16));
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    const near = (i, value) => Math.abs(data[i] - value) < 12;
+    return data.some((_, i) => i % 4 === 0
+        && near(i, red) && near(i + 1, green) && near(i + 2, blue) && data[i + 3] > 100);
+"""
+
+
+async def test_the_wear_limit_is_drawn_as_soon_as_it_is_known(shop: Shop, browser: Browser) -> None:
+    def look() -> None:
+        enter(browser, shop, "olga")
+        ask = browser.driver.execute_cdp_cmd
+        script = ask("Page.addScriptToEvaluateOnNewDocument", {"source": ONE_CARD})
+        try:
+            browser.open(shop.page + PAGES["cell"])
+            browser.find("#trend canvas")
+            browser.find(f'[data-cell="{CELL}"][data-cycle]')
+            browser.until(lambda: browser.run(LIMIT_IS_DRAWN), "the limit")
+        finally:
+            ask("Page.removeScriptToEvaluateOnNewDocument", script)
+
+    await shop.beside(look)
+
+
 SUBMIT = """
     const [path, fields] = arguments;
     const form = Object.assign(document.createElement("form"), {method: "post", action: path});

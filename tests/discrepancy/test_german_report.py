@@ -75,6 +75,10 @@ def test_both_are_whole_and_show_the_same_numbers(pages: dict[str, str]) -> None
         page.feed(text)
         assert page.open == []
         assert f'<html lang="{language}">' in text
+        assert "100 to 100 %" not in text
+        assert "100 bis 100 %" not in text
+        assert not re.search(r"e-0\d m\b", text)
+        assert " µm (" in text
     english, german = both["en"], both["de"]
     assert len(english.headings) == len(german.headings)
     assert english.pictures == german.pictures
@@ -175,6 +179,11 @@ def test_laws_of_a_machine_and_where_they_come_from_are_said_in_german() -> None
         (
             "The noise of force is not stated; 0.312 was estimated from neighbouring samples, which is a ...",
             ("de", ("Das Rauschen (Kraft) ist nicht angegeben; 0,312 ist aus benachbarten Messwerten "
+                    "geschätzt, eine untere Schranke, wo es korreliert ist.")),
+        ),
+        (
+            "The noise of position is not stated; 1.5 µm was estimated from neighbouring samples, which ...",
+            ("de", ("Das Rauschen (Position) ist nicht angegeben; 1,5 µm ist aus benachbarten Messwerten "
                     "geschätzt, eine untere Schranke, wo es korreliert ist.")),
         ),
         ("Shot 7 has a gap in time; what happened in it is lost.",

@@ -18,6 +18,7 @@ from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.report.sentences import headline, phrase
 from impactcell.discrepancy.search.conclusion import Place, Remaining
 from impactcell.discrepancy.workflow import DiscrepancyResult
+from impactcell.physics.effect_names import as_title
 from impactcell.physics.effects import LIBRARY
 from tests.discrepancy.test_workflow import investigated
 
@@ -99,7 +100,7 @@ def test_the_page_is_whole_and_fetches_nothing(text_of_tied: str) -> None:
     assert page.headings == [*SECTIONS, "How it was computed"]
     assert page.outside() == []
     assert page.pictures == 4  # two maps, the traces, the friction factors
-    assert all(phrase(effect) in page.text for effect in LIBRARY)
+    assert all(as_title(phrase(effect)) in page.text for effect in LIBRARY)
     assert "weigh the part" in page.text
 
 

@@ -6,9 +6,13 @@ from typing import Any
 
 import pytest
 
-from impactcell.discrepancy.report import figures, sentences
+from impactcell.discrepancy.report import figures, machine_sentences, sentences
 from impactcell.discrepancy.search.validation import Gap, GapChange, Part
 from impactcell.german.findings import german_headline
+from impactcell.german.parameters import parameter_words
+from impactcell.physics.effect_names import as_title, identifier_of, in_words
+from impactcell.physics.effects import LIBRARY
+from impactcell.web.messages import Messages
 
 
 def test_a_figure_names_the_setting_of_its_shot() -> None:
@@ -56,7 +60,7 @@ def test_a_tie_and_a_name_are_told_as_what_they_are(ties: tuple[str, ...]) -> No
         ),
         (
             ["adhesion", "surface_tilt", "hertz_contact"],
-            "adhesion, surface tilt and hertz contact; with them the held-out gap falls from 3.00 to 1.00",
+            "adhesion, surface tilt and Hertz contact; with them the held-out gap falls from 3.00 to 1.00",
             "Haften beim Trennen, Neigung des Tisches und Hertzscher Kontakt; damit fällt die Abweichung",
         ),
     ],
@@ -127,3 +131,15 @@ def test_where_only_the_spread_between_shots_falls_no_gap_is_said_to_fall() -> N
     assert "fällt die Abweichung" not in auf_deutsch
     assert "zwischen Messungen vom 1,55-Fachen auf das 0,98-Fache der von Wiederholungen" in auf_deutsch
     assert "bleibt bei 2,96" in auf_deutsch
+
+
+def test_an_effect_is_called_as_one_writes_it_and_keeps_its_identifier() -> None:
+    """Also in a headline, where it comes first: who it is named after has a capital, and keeps it."""
+    for identifier in (*LIBRARY, "coulomb_friction"):
+        assert identifier_of(in_words(identifier)) == identifier
+    assert in_words("hunt_crossley_damping") == Messages("en").effect("hunt_crossley_damping")
+    assert as_title(machine_sentences.phrase("coulomb_friction")) == "Coulomb friction"
+    assert as_title(sentences.phrase("hunt_crossley_damping")) == "Hunt-Crossley damping"
+    assert (
+        parameter_words("stribeck_friction", "stribeck_velocity_m_s", "de")[0] == "Stribeck-Geschwindigkeit"
+    )

@@ -19,6 +19,8 @@ MIN_DEGREES_OF_FREEDOM = 3
 """Fewer degrees of freedom give no spread of replicates: it would be uncertain by half."""
 MIN_REPLICATE_SPREAD = 1e-9
 """Smallest spread of replicates, so that equal factors divide nothing by zero."""
+TOLD_IN = ((1.0, "N"), (1e6, "µm"), (1e6, "µm"))
+"""What the noise of each channel is told in: how many of a unit there are in one of SI."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +67,10 @@ def sensor_noise(prepared: PreparedCampaign) -> NoiseFloor:
                     "state it in campaign.yaml"
                 )
                 raise CampaignError(message)
+            scale, unit = TOLD_IN[channel]
             notes.append(
-                f"The noise of {name} is not stated; {estimate:.3g} was estimated from neighbouring samples, "
-                "which is a lower bound where noise is correlated."
+                f"The noise of {name} is not stated; {scale * estimate:.3g} {unit} was estimated from "
+                "neighbouring samples, which is a lower bound where noise is correlated."
             )
             stds.append(estimate)
             sources.append("estimated")

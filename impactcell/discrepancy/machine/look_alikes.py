@@ -8,6 +8,7 @@ from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.regression import Blocks
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.weak_form import Column
+from impactcell.physics.effect_names import in_words
 
 MACHINE: tuple[Column, ...] = tuple(
     (name, 0.0, 0) for name in ("inertia", "gravity_torque", "force_gain", "force_offset")
@@ -30,7 +31,7 @@ def like_the_machine(blocks: Blocks, term: ChosenTerm) -> bool:
 
 def alike_note(candidates: Sequence[TermChoice], kept: Sequence[TermChoice]) -> list[str]:
     """Say which terms are not looked for."""
-    names = [choice.name.replace("_", " ") for choice in candidates if choice not in kept]
+    names = [in_words(choice.name) for choice in candidates if choice not in kept]
     if not names:
         return []
     return [f"{', '.join(names)}: on these records like inertia, gravity or drive, and so not looked for."]

@@ -10,6 +10,7 @@ from typing import Final
 
 from impactcell.discrepancy.report.german_words import phrase, term_name
 from impactcell.german.findings import with_decimal_commas
+from impactcell.physics.effect_names import identifier_of
 
 Patterns = Sequence[tuple[str, str | Callable[[re.Match[str]], str]]]
 """English as a pattern, and German as that is expanded; a function gives nothing where it knows no part."""
@@ -67,7 +68,7 @@ def _data_fault(match: re.Match[str]) -> str:
 
 NOTES: Final[Patterns] = (
     (r"Data, ([^:]+): (?:shot (\d+): )?(.*?)(?:; the like in (\d+) more shots)?\.", _data_fault),
-    (r"The noise of (\w+) is not stated; (\S+) was estimated .*",
+    (r"The noise of (\w+) is not stated; (\S+(?: \S+)?) was estimated .*",
      lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus benachbarten Messwerten "
      "geschätzt, eine untere Schranke, wo es korreliert ist."),
     (r"The mass of shot (\d+) is not stated and is fitted, block by block\.",
@@ -214,8 +215,8 @@ def _of(english: str, patterns: Patterns) -> str | None:
 
 
 def _terms(names: str) -> str:
-    return ", ".join(term_name(name.replace(" ", "_")) for name in names.split(", "))
+    return ", ".join(term_name(identifier_of(name)) for name in names.split(", "))
 
 
 def _quantities(english: str) -> str:
-    return " und ".join(phrase(name.replace(" ", "_")) for name in english.split(" and "))
+    return " und ".join(phrase(identifier_of(name)) for name in english.split(" and "))

@@ -4,6 +4,7 @@ from typing import Final
 
 from impactcell.discrepancy.machine import LAW_PLACES
 from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, GERMAN_STATES, german_texts
+from impactcell.physics.effect_names import in_words
 
 WORDS: Final = {
     **GERMAN_PHASES,
@@ -46,7 +47,7 @@ def phrase(identifier: str) -> str:
     """Name an effect, a phase, a covariate or a verdict."""
     if (german := german_texts(identifier)) is not None:
         return german.name
-    return WORDS.get(identifier, identifier.replace("_", " "))
+    return WORDS.get(identifier, in_words(identifier))
 
 
 def term_name(name: str) -> str:

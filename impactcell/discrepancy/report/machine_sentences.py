@@ -5,6 +5,7 @@ from impactcell.discrepancy.machine import FREE_FORMS, LAW_PLACES, MachineFindin
 from impactcell.discrepancy.report.sentences import equation, label, note, reason, setting, written
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import open_loop_sentence
+from impactcell.physics.effect_names import as_title, in_words
 
 __all__ = ["equation", "headline", "label", "note", "phrase", "reason", "reference", "setting", "written"]
 
@@ -12,7 +13,7 @@ __all__ = ["equation", "headline", "label", "note", "phrase", "reason", "referen
 def phrase(name: str) -> str:
     """Name of a term as one would say it."""
     identifier, _, column = name.partition("(")
-    return identifier.replace("_", " ") + (f" by {column.rstrip(')')}" if column else "")
+    return in_words(identifier) + (f" by {column.rstrip(')')}" if column else "")
 
 
 def reference(english: str) -> str:
@@ -71,7 +72,7 @@ def _conclusion(finding: MachineFinding) -> str:
         said = f"No known term explains a held-out gap of {before:.2f} noise floors"
         if finding.unconfirmed:
             names = enumerated([*map(phrase, finding.unconfirmed)], "and")
-            said = f"{names.capitalize()} would explain what fitted, but held-out records do not confirm it"
+            said = f"{as_title(names)} would explain what fitted, but held-out records do not confirm it"
         reason = finding.steps[0].reason if finding.steps else ""
         return f"{said}: {reason}." if reason else f"{said}."
     groups = [

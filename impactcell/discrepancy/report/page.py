@@ -14,6 +14,7 @@ from impactcell.discrepancy.search import ALPHA, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.german.findings import REPORTS
 from impactcell.german.parameters import parameter_words
+from impactcell.physics.effect_names import as_title
 from impactcell.physics.effects import LIBRARY
 from impactcell.records.uncertainty import TOLD_STDS
 
@@ -21,6 +22,8 @@ EFFECT_GUIDE = (Path(__file__).parents[1] / "README.md").as_uri() + "#a-new-effe
 """Where the report sends whoever wants to write a new effect."""
 LARGE_REGION_RMS = 1.25
 """RMS of a region's residuals, in noise floors, from which on it is shown as large."""
+ALL_CLOSED = 0.99
+"""Share of a gap from which on more digits would say nothing more."""
 MM_PER_M = 1e3
 """Millimetres in a metre: the page shows errors of positions in them."""
 SENTENCES: Mapping[str, ModuleType] = {"en": sentences, "de": german_sentences}
@@ -56,6 +59,7 @@ def report_environment(said: ModuleType) -> Environment:
         number=lambda value: said.written(format_number(value)),
         grouped=lambda value, decimals: said.written(format_thousands(value, decimals)),
     )
+    environment.globals["percent_range"] = lambda *interval: said.written(percent_range(*interval))
     return environment
 
 
@@ -68,6 +72,19 @@ def format_number(value: float) -> str:
 def format_thousands(value: float, decimals: int) -> str:
     """Thousands apart."""
     return f"{value:,.{decimals}f}".replace(",", " ")
+
+
+def percent_range(low: float, high: float, to: str, more_than: str) -> str:
+    """Write an interval of shares in per cent, with a decimal where its ends would look the same.
+
+    >>> shares = ((0.4, 0.92), (0.951, 0.953), (0.998, 1.0))
+    >>> [percent_range(*share, "to", "more than") for share in shares]
+    ['40 to 92', '95.1 to 95.3', 'more than 99']
+    """
+    if low >= ALL_CLOSED:
+        return f"{more_than} {100.0 * ALL_CLOSED:.0f}"
+    decimals = 0 if round(100.0 * low) != round(100.0 * high) else 1
+    return f"{100.0 * low:.{decimals}f} {to} {100.0 * high:.{decimals}f}"
 
 
 def page_context(result: DiscrepancyResult, source: str, language: str = "en") -> dict[str, Any]:
@@ -156,6 +173,7 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
         "seed": result.seed,
         "guide": EFFECT_GUIDE,
         "words": phrase,
+        "as_title": as_title,
         "setting": said.setting,
         "shape_in_words": said.shape,
     }

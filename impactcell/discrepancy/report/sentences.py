@@ -8,6 +8,7 @@ from impactcell.discrepancy.search import NO_GAP, UNTESTED, Remaining, Validatio
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import open_loop_sentence
+from impactcell.physics.effect_names import as_title, in_words
 from impactcell.physics.effects import find_effect
 from impactcell.physics.free_column_forms import printed
 
@@ -17,7 +18,7 @@ NOT_SET = frozenset({"direction", "order"})
 
 def phrase(identifier: str) -> str:
     """Name of an effect as one would say it."""
-    return identifier.replace("_", " ")
+    return in_words(identifier)
 
 
 def written(text: str) -> str:
@@ -87,7 +88,7 @@ def advice(result: DiscrepancyResult) -> list[dict[str, Any]]:
             if told.meaning:
                 rows.append(
                     {
-                        "name": phrase(name).capitalize(),
+                        "name": phrase(name),
                         "is_rival": place > 0,
                         "meaning": told.meaning,
                         "look_at": told.look_at,
@@ -169,7 +170,7 @@ def _outdone(result: DiscrepancyResult) -> str:
     outdone = result.selection.outdone
     if outdone is None or not outdone.form:
         return ""
-    name = phrase(outdone.effect).capitalize()
+    name = as_title(phrase(outdone.effect))
     form = f"a free function s, {find_effect(outdone.form).equation},"
     if outdone.same_place:
         return f" {name} comes nearest, but {form} follows better in the same place: the law is another."
@@ -198,7 +199,7 @@ def _conclusion(result: DiscrepancyResult) -> str:
         if conclusion.unconfirmed:
             names = enumerated([*map(phrase, conclusion.unconfirmed)], "and")
             said = (
-                f"{names.capitalize()} would explain the training shots, but held-out shots do not confirm "
+                f"{as_title(names)} would explain the training shots, but held-out shots do not confirm "
                 f"it: their gap is {_gap(proof)} noise floors"
             )
         return f"{said}{_where(result)}.{_outdone(result)}"

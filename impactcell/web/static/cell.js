@@ -1,13 +1,14 @@
 // One cell in depth: its last tap, its trend, its signature.
 import { Chart } from "./charts.js";
 import { moment } from "./frame.js";
-import { TOLD_STDS, coefficient, follow, hasCycle, number, set, showAlarm, showFriction, showState, showValues, texts, toldStd, withUnit } from "./live.js";
+import { TOLD_STDS, beside, coefficient, follow, hasCycle, number, set, showAlarm, showFriction, showState, showValues, texts, toldStd, withUnit } from "./live.js";
 
 const root = document.querySelector(".cell"), cell = root.dataset.cell;
-const edges = [{ colour: "band", width: 1 }, { colour: "band", width: 1 }];
+// A band of one value at each x is nothing but its edges.
+const edges = [{ colour: "edge", width: 1.5 }, { colour: "edge", width: 1.5 }];
 const tapSeries = [...edges, { colour: "curve", width: 1.5 }, { colour: "curve", width: 1.5 }];
 const place = (id) => document.getElementById(id);
-let limit = null, span = "hour", lastTrend = 0, charts = null, waiting = null;
+let limit = null, past = null, span = "hour", lastTrend = 0, charts = null, waiting = null;
 
 function makeCharts() {
   return {
@@ -52,13 +53,16 @@ function showCard(card) {
   showState(root, card);
   if (!hasCycle(card)) return;
   const reasons = card.reasons[document.documentElement.lang];
-  limit = values["Wear/Limit"];
+  if (limit !== values["Wear/Limit"]) {
+    limit = values["Wear/Limit"];
+    drawTrend();
+  }
   showFriction(root, card);
   showValues(root, card);
   const offset = values["Batch/Offset"], std = values["Batch/OffsetStdDev"], gap = values["Model/Gap"];
   const said = {
     cycle_time: moment(card.time_ms),
-    batch_offset: offset === null ? "" : `${coefficient(offset)}${std === null ? "" : ` ${toldStd(std)}`} ${texts.batch_offset}`,
+    batch_offset: offset === null ? "" : `${std === null ? coefficient(offset) : `${beside(std, offset)} ${toldStd(std)}`} ${texts.batch_offset}`,
     estimator: texts[card.estimator],
     mass: withUnit(card.mass, "kg"),
     signature_reason: reasons.signature,
@@ -78,7 +82,12 @@ async function loadTrend() {
   if (!answer || asked !== span) return;
   if (answer.status === 404) return charts.trend.clear(texts.no_past);
   if (!answer.ok) return;
-  const past = await answer.json();
+  past = await answer.json();
+  drawTrend();
+}
+
+function drawTrend() {
+  if (!past) return;
   if (!past.time_ms.length) return charts.trend.clear(texts.no_trend);
   const marks = past.batches.map(([ms, id]) => ({ x: ms / 1e3, text: id, colour: "soft" }));
   if (limit !== null) marks.push({ y: limit, text: texts.limit, colour: "bad", dashed: true });

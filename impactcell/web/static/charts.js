@@ -1,7 +1,7 @@
 // Charts: a band, a line on it, and marks; colours are those of the page.
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
-/** Draws vertical marks with a word each, and horizontal dashed lines. */
+/** Draws vertical marks with a word each, and horizontal dashed lines with theirs above; no curve runs through a word. */
 function drawMarks(plot, marks) {
   const { ctx, bbox } = plot, ratio = devicePixelRatio;
   ctx.save();
@@ -12,6 +12,14 @@ function drawMarks(plot, marks) {
   ctx.lineWidth = 1.5 * ratio;
   ctx.textAlign = "left";
   ctx.textBaseline = "alphabetic";
+  const write = (text, x, y) => {
+    ctx.save();
+    Object.assign(ctx, { strokeStyle: colour("panel"), lineWidth: 4 * ratio, lineJoin: "round" });
+    ctx.setLineDash([]);
+    ctx.strokeText(text, x, y);
+    ctx.restore();
+    ctx.fillText(text, x, y);
+  };
   let lastEnd = -Infinity;
   for (const mark of marks) {
     ctx.strokeStyle = ctx.fillStyle = colour(mark.colour);
@@ -23,15 +31,17 @@ function drawMarks(plot, marks) {
       ctx.lineTo(x, bbox.top + bbox.height);
       const width = ctx.measureText(mark.text).width;
       const at = Math.min(x + 4 * ratio, bbox.left + bbox.width - width - 2 * ratio);
-      if (at > lastEnd) { ctx.fillText(mark.text, at, bbox.top + 13 * ratio); lastEnd = at + width; }
+      ctx.stroke();
+      if (at > lastEnd) { write(mark.text, at, bbox.top + 13 * ratio); lastEnd = at + width; }
     } else {
       const y = plot.valToPos(mark.y, "y", true);
       ctx.moveTo(bbox.left, y);
       ctx.lineTo(bbox.left + bbox.width, y);
-      const width = ctx.measureText(mark.text).width;
-      ctx.fillText(mark.text, bbox.left + bbox.width - width - 4 * ratio, y + 14 * ratio);
+      ctx.stroke();
+      const at = bbox.left + bbox.width - ctx.measureText(mark.text).width - 4 * ratio;
+      const isTaken = lastEnd > at && y - 18 * ratio < bbox.top + 13 * ratio; // by the word of a vertical mark
+      write(mark.text, at, isTaken || y - 16 * ratio < bbox.top ? y + 14 * ratio : y - 5 * ratio);
     }
-    ctx.stroke();
   }
   ctx.restore();
 }
@@ -82,7 +92,8 @@ export class Chart {
       const values = [low, high, ...this.marks.map((mark) => mark.y)].filter((value) => Number.isFinite(value));
       if (!values.length) return [0, 1];
       const least = Math.min(...values), most = Math.max(...values), room = Math.max(most - least, 1e-9) * 0.08;
-      return [least - room, most + room];
+      const above = this.marks.some((mark) => mark.y === most) ? 2.5 * room : room; // for its word
+      return [least - room, most + above];
     };
     const options = {
       ...this.size(),

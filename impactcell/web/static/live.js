@@ -16,6 +16,14 @@ export function coefficient(value) {
 export const TOLD_STDS = Number(document.body.dataset.toldStds);
 /** Two significant digits, also where the second is a 0: 0.0020 beside 0.0137. */
 export const toldStd = (std) => `± ${new Intl.NumberFormat(language, { minimumSignificantDigits: 2, maximumSignificantDigits: 2, useGrouping: false }).format(TOLD_STDS * std)}`;
+/** A value with as many decimals as stand behind its "±": 0.5600 beside 0.0011. */
+export function beside(std, value) {
+  if (value === null || value === undefined) return "–";
+  const decimals = Math.min(Math.max(1 - Number((TOLD_STDS * std).toExponential(1).split("e")[1]), 0), 15);
+  return new Intl.NumberFormat(language, { minimumFractionDigits: decimals, maximumFractionDigits: decimals, useGrouping: Math.abs(value) >= 1e4 }).format(value);
+}
+/** Cycles still to come: whole ones, and none that is not sure. */
+export const wholeCycles = (value) => (Number.isFinite(value) ? number(Math.floor(value), 10) : "–");
 export const withUnit = (value, unit, digits) => (value === null || value === undefined ? "–" : `${number(value, digits)} ${unit}`);
 
 export function set(root, field, text) {
@@ -29,16 +37,16 @@ export const quality = (card, path) => card.qualities[path] ?? "good";
 export function showValues(root, card) {
   for (const place of root.querySelectorAll("[data-quantity]")) {
     const { quantity: path, unit, form } = place.dataset, value = card.values[path];
+    const std = card.values[`${path}StdDev`] ?? null;
     let text = "–";
     if (typeof value === "boolean") text = value ? texts.yes : texts.no;
     else if (typeof value === "string") text = value || "–";
+    else if (std !== null && Number.isFinite(value)) text = [beside(std, value), toldStd(std), unit].filter(Boolean).join(" ");
     else if (form === "coefficient") text = coefficient(value);
     else if (form === "cycle") text = value ? number(value, 10) : "–";
-    else if (form === "cycles") text = Number.isFinite(value) ? number(Math.floor(value), 4) : "–";
+    else if (form === "cycles") text = wholeCycles(value);
     else if (form === "count") text = number(value, 10);
     else text = unit ? withUnit(value, unit) : number(value);
-    const std = card.values[`${path}StdDev`];
-    if (std !== undefined && std !== null && text !== "–") text += ` ${toldStd(std)}`;
     const kind = quality(card, path);
     if (text !== "–" && kind !== "good") text += ` (${texts[kind]})`;
     if (place.textContent !== text) place.textContent = text;
@@ -47,7 +55,7 @@ export function showValues(root, card) {
 
 export function showState(root, card) {
   const kind = card.freshness === "live" && !hasCycle(card) ? "waiting" : card.freshness;
-  const sign = { live: "●", waiting: "○", stale: "⏱", lost: "✕" }[kind];
+  const sign = { live: "●", waiting: "○", stale: "!", lost: "✕" }[kind];
   for (const place of root.querySelectorAll('[data-field="state"]')) {
     place.className = `state ${{ live: "good", waiting: "plain", stale: "warn", lost: "bad" }[kind]}`;
     place.textContent = `${sign} ${texts[kind]}`;
@@ -61,14 +69,15 @@ export function cyclesLeft(values) {
   const low = values["Wear/CyclesToLimitLow"], high = values["Wear/CyclesToLimitHigh"];
   if (level !== null && limit !== null && level > limit) return texts.passed;
   if (cycles === null) return texts.not_reached;
-  const range = low === null ? "" : ` (${texts.from} ${number(low, 2)}${high === null ? "" : ` ${texts.to} ${number(high, 2)}`})`;
-  return `${number(cycles, 2)}${range}`;
+  const range = low === null ? "" : ` (${texts.from} ${wholeCycles(low)}${high === null ? "" : ` ${texts.to} ${wholeCycles(high)}`})`;
+  return `${wholeCycles(cycles)}${range}`;
 }
 
 export function showFriction(root, card) {
   const { values } = card, level = values["Wear/Level"], limit = values["Wear/Limit"] ?? 1;
   const std = values["Friction/StaticFrictionStdDev"], kind = quality(card, "Friction/StaticFriction");
-  set(root, "mu_s", coefficient(values["Friction/StaticFriction"]));
+  const mu_s = values["Friction/StaticFriction"];
+  set(root, "mu_s", std === null ? coefficient(mu_s) : beside(std, mu_s));
   set(root, "mu_s_band", std === null ? "" : toldStd(std));
   set(root, "mu_s_quality", kind === "good" ? "" : `${texts[kind]}: ${card.reasons[language].mu_s}`);
   set(root, "wear", `${coefficient(level)} / ${coefficient(values["Wear/Limit"])}`);
@@ -80,7 +89,7 @@ export function showFriction(root, card) {
   set(root, "batch", values["Batch/BatchId"] || "–");
 }
 
-/** The alarm that matters most: open before over, then the latest. */
+/** The alarm that matters most: open before cleared, then the latest. */
 export function lastAlarm(alarms) {
   const told = alarms.filter((alarm) => alarm.time_ms > 0 && alarm.message.en);
   const rank = (alarm) => (alarm.active ? 2 : 0) + (alarm.acknowledged ? 0 : 1);
@@ -91,16 +100,22 @@ export const isOpen = (alarm) => alarm.enabled && alarm.shelved === "unshelved" 
 export function evidence(alarm) {
   const e = alarm.evidence, parts = [];
   if (e.compared[language]) parts.push(e.compared[language]);
-  if (e.size !== null) parts.push(`${texts.size} ${number(e.size, 2)}` + (e.size_std === null ? "" : ` ${toldStd(e.size_std)}`));
+  if (e.size !== null) parts.push(`${texts.size} ${e.size_std === null ? number(e.size, 2) : `${beside(e.size_std, e.size)} ${toldStd(e.size_std)}`}`);
   if (e.change_cycle) parts.push(`${texts.since_cycle} ${e.change_cycle}`);
   return parts.join(", ");
+}
+
+/** What an alarm says, or said before it cleared. */
+function reason(alarm) {
+  const message = alarm.message[language] || alarm.message.en;
+  return alarm.active ? message : `${texts.cleared} ${message}`;
 }
 
 export function showAlarm(place, alarms, emptyText) {
   const alarm = lastAlarm(alarms);
   const open = alarm && isOpen(alarm);
   place.classList.toggle("is-open", Boolean(open));
-  const lines = alarm ? [`${open ? "▲ " : "○ "}${texts[alarm.name]}${alarm.acknowledged ? "" : ` (${texts.acknowledge})`}: ${alarm.message[language] || alarm.message.en}`, evidence(alarm)] : [emptyText];
+  const lines = alarm ? [`${open ? "▲ " : "○ "}${texts[alarm.name]}${alarm.acknowledged ? "" : ` (${texts.acknowledge})`}: ${reason(alarm)}`, evidence(alarm)] : [emptyText];
   place.replaceChildren(...lines.filter(Boolean).map((line, index) => {
     const paragraph = document.createElement("p");
     if (index) paragraph.className = "help";

@@ -25,7 +25,7 @@ function worry(cell, what) {
     const link = document.createElement("a");
     link.href = `/cells/${encodeURIComponent(name)}`;
     link.className = `tag ${alarm || state === "lost" ? "bad" : "warn"}`;
-    link.textContent = `${alarm ? "▲" : state === "lost" ? "✕" : "⏱"} ${name}`;
+    link.textContent = `${alarm ? "▲" : state === "lost" ? "✕" : "!"} ${name}`;
     link.title = [alarm && texts.open_one, state && texts[state]].filter(Boolean).join(", ");
     return link;
   });

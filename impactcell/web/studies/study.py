@@ -96,6 +96,11 @@ class Study(msgspec.Struct):
         return self.stage not in (*ENDED, Stage.RECEIVING) or bool(self.accepting)
 
     @property
+    def is_unreadable(self) -> bool:
+        """Whether its files are not read yet, for want of something that is to be given."""
+        return self.stage is Stage.CONFIRMING and bool(self.faults)
+
+    @property
     def is_accepted(self) -> bool:
         """Whether its model was the last that it put into service."""
         return bool(self.acceptances) and self.acceptances[-1].action == "accept"

@@ -27,10 +27,8 @@ SCRIPT_TEXTS: Texts = {
     "live_from": ("from", "von"),
     "live_to": ("to", "bis"),
     "live_acknowledge": ("not acknowledged", "nicht quittiert"),
-    "live_batch_offset": (
-        "against the first batch; a new model moves it too, so that wear goes on where it was",
-        "gegenüber der ersten Charge; auch ein neues Modell verschiebt es, damit der Verschleiß weitergeht",
-    ),
+    "live_batch_offset": ("against the first batch", "gegenüber der ersten Charge"),
+    "live_cleared": ("cleared; it said:", "vorbei; gemeldet war:"),
     "live_since_cycle": ("since cycle", "seit Zyklus"),
     "live_in_cycles": ("cycles to go:", "Zyklen bis dahin:"),
     "live_size": ("size", "Größe"),

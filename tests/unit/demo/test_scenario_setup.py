@@ -1,10 +1,24 @@
 """The demo tells what its scenario does, and what the cell has to find out by itself."""
 
+import contextlib
+import logging
 import socket
 
 import pytest
+import yaml
 
-from impactcell.demo.scenario_setup import customary_port, fit_events, story
+from impactcell.demo import scenario_setup
+from impactcell.demo.scenario_setup import (
+    CONFIG,
+    SCENARIOS,
+    TOUR_OVER,
+    customary_port,
+    fit_events,
+    story,
+    tour_end,
+)
+from simulator.process import strike_conditions
+from simulator.scenario import read_scenario
 
 
 def test_a_batch_that_the_plc_keeps_to_itself_is_told_as_such() -> None:
@@ -18,6 +32,41 @@ def test_a_batch_that_the_plc_keeps_to_itself_is_told_as_such() -> None:
         (40, "batch B is on the table"),
         (90, "batch C is on the table, and the PLC says nothing of it"),
     )
+
+
+def test_what_compiles_is_a_step_that_shows_how_long_it_takes(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    begun: list[str] = []
+
+    def compile_for_long(*_: object) -> None:
+        assert begun == ["setting up"]
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(scenario_setup, "warm_up", compile_for_long)
+    monkeypatch.setattr(scenario_setup, "named_steps", lambda: contextlib.nullcontext(begun.append))
+    caplog.set_level(logging.INFO, "impactcell")
+    with pytest.raises(KeyboardInterrupt), scenario_setup.set_up_scenario("demo", None):
+        pass
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS)
+def test_a_demo_says_when_its_tour_is_over(scenario: str) -> None:
+    content = yaml.safe_load((CONFIG / "sim" / f"{scenario}.yaml").read_text(encoding="utf-8"))
+    said = tour_end(content)
+    if scenario == "demo":
+        assert said == ((131, TOUR_OVER),)
+        assert max(cycle for cycle, _ in story(content)) == 90
+    else:  # a last part ends the one, a new model the other
+        assert said == ()
+
+
+def test_a_demo_that_nobody_ends_keeps_a_friction_that_its_model_knows() -> None:
+    scenario = read_scenario(CONFIG / "sim" / "demo.yaml")
+    model = yaml.safe_load((CONFIG / "models" / "prototype.yaml").read_text(encoding="utf-8"))
+    low, high = model["predictors"][0]["mu_s_range"]
+    for cycle in (200, 2_000, 100_000):
+        assert low < strike_conditions(scenario, cycle, 0.0, 1).plant.mu_s < high
 
 
 @pytest.mark.parametrize(("cycles", "begins"), [(None, [1, 40, 90]), (50, [1, 20, 45]), (1, [1, 2, 3])])

@@ -69,6 +69,41 @@ def test_nothing_is_cut_off(width: int, height: int) -> None:
     assert "…" not in text
 
 
+ENDPOINT = (
+    "opc.tcp://127.0.0.1:4840/impactcell · page: http://127.0.0.1:8480 · user demo, password 0123456789ab"
+)
+
+
+@pytest.mark.parametrize(("width", "height"), [(80, 24), (60, 15), (120, 40), (80, 10), (60, 60)])
+def test_many_alarms_push_nothing_out(width: int, height: int) -> None:
+    last = history(30)[-1]
+    alarms = tuple(
+        replace(alarm, active=place > 1, acknowledged=False, cycle=21, message=f"by +0.01 {'since ' * 30}")
+        for place, alarm in enumerate(last.alarms)
+    )
+    console = Console(width=width, file=io.StringIO(), record=True)
+    scene = Scene(
+        "press-1", ENDPOINT, "batch C is on the table", [*history(29), replace(last, alarms=alarms)]
+    )
+    console.print(render(scene, width, height))
+    lines = console.export_text().splitlines()
+    assert len(lines) <= height
+    assert lines[-1].startswith("╰")
+    text = " ".join(line.strip("│ ") for line in lines)
+    for whole in (*ENDPOINT.split(), "Ctrl-C ends", "batch C is on the table"):
+        assert whole in text
+    assert lines[2].startswith("│ OPC UA:")
+    assert ("•" in text) is (height >= 24)
+    names = [alarm.name for alarm in (*alarms[2:], *alarms[:2])]
+    places = [text.find(name) for name in names if name in text]
+    assert places == sorted(places)
+    assert "WearLimit cleared, unacknowledged since cycle 21: it said: by" in text or height < 60
+    assert "ModelGap active, unacknowledged since cycle 21: by" in text or height < 60
+    told = [place for place, line in enumerate(lines) if "since cycle 21" in line]
+    if len(told) < len(alarms):
+        assert f"+{len(alarms) - len(told)} more: " in lines[-2] or f"{len(alarms)} alarms: " in lines[-2]
+
+
 def test_a_low_terminal_keeps_the_facts_and_does_without_the_chart() -> None:
     text = drawn(history(30), 80, 14)
     assert len(text.splitlines()) <= 14
@@ -133,7 +168,7 @@ def test_nothing_known_is_drawn_as_such() -> None:
     )
     text = drawn([blank])
     assert "no usable estimate yet" in text
-    assert "none" in text
+    assert "none: clipped" in text
     assert "nan" not in text
     assert "by none" not in text
 

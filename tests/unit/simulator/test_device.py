@@ -178,6 +178,15 @@ def test_wear_batches_and_deviation_follow_the_script() -> None:
     assert client.get("batch_from_cycle") == 4
 
 
+def test_wear_that_ends_stays_as_it_is() -> None:
+    wear = {"mu_s_per_1000_cycles": 1.0, "until_cycle": 4}
+    client = Client(scenario(scatter={"friction": 0.0}, wear=wear))
+    for second in range(7):
+        client.device.update(second + 0.9)
+    expected = [0.2, 0.201, 0.202, 0.203, 0.203, 0.203]
+    np.testing.assert_allclose([truth["mu_s"] for truth in client.truth], expected, rtol=1e-12)
+
+
 def test_a_batch_announced_by_a_writing_plc() -> None:
     client = Client(scenario())
     client.device.update(1.9)

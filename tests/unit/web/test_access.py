@@ -301,7 +301,7 @@ async def test_what_stands_behind_plus_minus_is_said_where_it_is_read(page: Page
     await put(page, CellNews(CELL, alarms=(raised(evidence=Evidence(12.0, 11.0, 4, 0.01, 0.002)),)))
     async with page.logged_in(Role.OBSERVER) as client:
         alarms = (await client.get("/alarms?lang=de")).text
-        assert "Größe 0,01 ± 0,0040" in alarms
+        assert "Größe 0,0100 ± 0,0040" in alarms
         for path in ("/", f"/cells/{CELL}", "/alarms"):
             text = (await client.get(path)).text
             assert f'data-told-stds="{TOLD_STDS}"' in text
@@ -352,6 +352,34 @@ async def test_every_page_counts_the_open_alarms(page: Page, path: str) -> None:
         assert 'id="open-alarms" aria-label="Open alarms: 1">1<' in (await client.get(path)).text
         await put(page, CellNews(CELL, alarms=(raised(shelving=Shelving.TIMED),)))
         assert 'id="open-alarms" hidden>' in (await client.get(path)).text
+
+
+async def test_the_navigation_says_where_one_is_and_leads_back(page: Page) -> None:
+    study = page.studies.store.begin("rail", "otto", CELL)
+    for path, current, back in (
+        ("/", '<a href="/" aria-current="page">Cells</a>', ""),
+        (f"/cells/{CELL}", '<a href="/" aria-current="true">Cells</a>', '<p><a href="/">Cells</a></p>'),
+        (f"/studies/{study.id}", '<a href="/studies" aria-current="true">Measurements</a>', ""),
+    ):
+        async with page.logged_in(Role.OBSERVER) as client:
+            text = (await client.get(path)).text
+        navigation = text[text.index("<nav") : text.index("</nav>")]
+        assert current in navigation
+        assert navigation.count("aria-current") == 1
+        assert back in text
+
+
+@pytest.mark.parametrize(
+    ("language", "said"), [("en", "It said: friction is off"), ("de", "Gemeldet war: Reibung passt nicht")]
+)
+async def test_what_an_alarm_said_is_past_once_it_has_cleared(page: Page, language: str, said: str) -> None:
+    for active in (True, False):
+        alarm = replace(raised(message_de="Reibung passt nicht"), active=active)
+        await put(page, CellNews(CELL, alarms=(alarm,)))
+        async with page.logged_in(Role.OBSERVER) as client:
+            text = (await client.get(f"/alarms?lang={language}")).text
+        assert (f"<p>{said}</p>" in text) is not active
+        assert ("○ cleared<" in text) is (language == "en" and not active)
 
 
 async def test_a_cell_that_places_nothing_shows_no_positioning(page: Page) -> None:

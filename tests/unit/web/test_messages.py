@@ -67,6 +67,7 @@ def test_no_text_is_left_over_or_missing() -> None:
             "all_mass",
             "all_velocity",
             "all_stroke",
+            "all_rate",
             *(role.name.lower() for role in Role),
         ),
     }

@@ -205,7 +205,7 @@ async def test_friction_of_each_shot(page: Page, verbs: Verbs) -> None:
         expected = {"mean": statistics.mean(values), "spread": statistics.stdev(values), "n": len(values)}
         assert found.result["mu_s"] == pytest.approx(expected, rel=1e-6)
         text = (await client.get(f"/studies/{study}")).text
-        assert "<td>0.22</td>" in text
+        assert "<td>0.2200</td>" in text
         assert "<td>0.0020</td>" in text, "two standard deviations behind ±; the file has one"
         assert "µs 0.3183 is outside the calibrated" in text
         assert "200/249 shots are shown" in text
@@ -228,7 +228,11 @@ async def test_faults_of_a_verb_are_shown_with_their_rows(page: Page, verbs: Ver
         await client.post(f"/studies/{study}/read", data={"csrf": await csrf_of(client)})
         await until(page, study, Stage.CONFIRMING)
         text = (await client.get(f"/studies/{study}")).text
-        assert "<li>run.csv:2: &#39;x&#39; is no number</li>" in text
+        assert '<li lang="en">run.csv:2: &#39;x&#39; is no number</li>' in text
+        assert ">not readable yet</span>" in text
+        assert "run.csv (8 B)" in text
+        assert 'name="set.rate"' in text
+        assert ">noch nicht lesbar</td>" in (await client.get("/studies?lang=de")).text
         assert "&lt;b&gt;&amp;&lt;/b&gt;" in text
         assert "<code>&lt;a&gt;</code>" in text
         assert 'name="unit.&lt;a&gt;"' in text
@@ -462,7 +466,7 @@ async def test_many_files_are_folded(page: Page) -> None:
         study.files = {"tap-0.csv": 115_000}
         one = (await client.get(f"/studies/{study.id}?lang=de")).text
     assert '<details class="help"><summary>27 Dateien, 3,1 MB</summary>tap-0.csv, tap-1.csv, ' in many
-    assert "tap-0.csv (0,12 MB)" in one
+    assert "tap-0.csv (120 kB)" in one
     assert "Dateien, " not in one
 
 
@@ -481,9 +485,9 @@ async def test_parameters_are_said_in_words_with_their_unit(page: Page) -> None:
         study.stage, study.result = Stage.DONE, RESULT | {"effects": [found, own]}
         study.changes = CHANGES | {"changes": changes}
         shown = {code: (await client.get(f"/studies/{study.id}?lang={code}")).text for code in ("en", "de")}
-    assert "</b> · stribeck velocity 0.04 m/s · friction increase 0.03" in shown["en"]
+    assert "</b> · Stribeck velocity 0.04 m/s · friction increase 0.03" in shown["en"]
     assert "</b> · Stribeck-Geschwindigkeit 0,04 m/s · Zunahme der Reibung 0,03" in shown["de"]
-    assert "own effect</b> · strength n per m 60" in shown["en"]
+    assert "Own effect</b> · strength n per m 60" in shown["en"]
     names = re.findall(r'<tr><td data-label="[^"]*">(.*?)</td>', shown["de"])
     assert names == ["µs", "Steifigkeit [N/m]", "Viskose Reibung: viskoser Koeffizient [N s/m]"]
 

@@ -1,0 +1,156 @@
+"""Why dropped files cannot be read, as the page says it: with its form as the way out, not with options."""
+
+import re
+from typing import Final, NamedTuple
+
+from impactcell.german.findings import GERMAN_QUANTITIES
+from impactcell.web.texts.import_notes import page_note
+
+PLACE: Final = r"(?P<place>(?:.+?: )?)"
+COLUMN: Final = r"column (['\"])(?P<column>.+?)\2"
+"""A column by its name, as Python quotes it; the quote is the group behind that of the place."""
+
+
+class _Fault(NamedTuple):
+    pattern: str
+    english: str
+    german: str
+
+
+FAULTS: Final = (
+    _Fault(
+        r"no column of time was found(?P<why>.*); name it with --column .*",
+        "no column of time was found{why}; choose it in the form below, or give the sampling rate there",
+        "keine Zeitspalte gefunden{why}; unten im Formular wählen, oder dort die Abtastrate angeben",
+    ),
+    _Fault(
+        r"has no column of time; name it, .*",
+        "has no column of time; choose it in the form below, or give the sampling rate there",
+        "hat keine Zeitspalte; unten im Formular wählen, oder dort die Abtastrate angeben",
+    ),
+    _Fault(
+        r"neither position nor force was found among (?P<names>.+); name them with --column .*",
+        "neither position nor force was found among {names}; choose their columns in the form below",
+        "weder Position noch Kraft gefunden unter {names}: ihre Spalten unten im Formular wählen",
+    ),
+    _Fault(
+        COLUMN + r" \((?P<meaning>\w+)\) has no unit; say --unit '.+?=(?P<unit>[^']+)'.*",
+        "column “{column}” ({meaning}) has no unit; give it in the form below, {unit} say",
+        "Spalte „{column}“ ({meaning}) hat keine Einheit; unten im Formular angeben, etwa {unit}",
+    ),
+    _Fault(
+        COLUMN + r" \((?P<meaning>\w+)\) is in (?P<unit>.+?); (?:give its unit|say what that) .*",
+        "column “{column}” ({meaning}) is in {unit}; give its unit in the form below, or choose the "
+        "right column",
+        "Spalte „{column}“ ({meaning}) ist in {unit}; unten im Formular ihre Einheit angeben oder "
+        "die richtige Spalte wählen",
+    ),
+    _Fault(
+        COLUMN + r" may be the (?P<meaning>\w+) \((?P<reason>.*)\); confirm it with --column .*",
+        "column “{column}” may be the {meaning} ({reason}); confirm it in the form below, or choose "
+        "the right one",
+        "Spalte „{column}“ könnte „{meaning}“ sein ({reason}); unten im Formular bestätigen oder die "
+        "richtige wählen",
+    ),
+    _Fault(
+        COLUMN + r" is called as the (?P<meaning>\w+), but is in (?P<unit>.+?); .*",
+        "column “{column}” is called as the {meaning}, but is in {unit}; give its unit in the form "
+        "below, or choose the right column",
+        "Spalte „{column}“ heißt wie „{meaning}“, ist aber in {unit}; unten im Formular ihre Einheit "
+        "angeben oder die richtige Spalte wählen",
+    ),
+    _Fault(
+        COLUMN + r" is in (?P<one>.+) in (?P<first>.+) and in (?P<other>.+) in (?P<second>.+); import the "
+        r"files .*",
+        "column “{column}” is in {one} in {first} and in {other} in {second}; drop the files one by "
+        "one, or give the unit of all in the form below",
+        "Spalte „{column}“ ist in {first} in {one} und in {second} in {other}; die Dateien einzeln "
+        "ablegen oder unten im Formular eine Einheit für alle angeben",
+    ),
+    _Fault(
+        r"the times are those of " + COLUMN + r", so that the rate has no use; .*",
+        "the times are those of column “{column}”, so that the rate has no use; take it out of the "
+        "form below",
+        "die Zeiten stehen in Spalte „{column}“, die Abtastrate hat keinen Zweck; aus dem Formular nehmen",
+    ),
+    _Fault(
+        COLUMN + r" has (?P<values>\d+) values in (?P<rows>\d+) rows, so it does not number shots; .*",
+        "column “{column}” has {values} values in {rows} rows, so it does not number shots; choose "
+        "another in the form below",
+        "Spalte „{column}“ hat {values} Werte in {rows} Zeilen, zählt also keine Stöße; unten im "
+        "Formular eine andere wählen",
+    ),
+    _Fault(
+        COLUMN
+        + r" \((?P<meaning>\w+)\) is (?P<one>.+) and (?P<other>.+) within one record, where a shot has "
+        r"one; .*",
+        "column “{column}” ({meaning}) is {one} and {other} within one record, where a shot has one; "
+        "choose the column that numbers the shots in the form below, or give one value for all of "
+        "them",
+        "Spalte „{column}“ ({meaning}) hat {one} und {other} in einer Aufzeichnung, ein Stoß aber "
+        "nur einen Wert: unten im Formular die Spalte wählen, die Stöße zählt, oder einen Wert für "
+        "alle angeben",
+    ),
+    _Fault(
+        r"(?:"
+        + COLUMN
+        + r" \()?(?P<meaning>\w+)\)? is (?P<value>.+); it has to be (?P<needed>.+): correct it, or .*",
+        "{meaning} is {value}; it has to be {needed}; correct it, or give it for all shots in the form below",
+        "{meaning} ist {value}, muss aber {needed} sein; berichtigen oder unten im Formular für alle "
+        "Stöße angeben",
+    ),
+    _Fault(
+        r"the force shows no contact \(largest (?P<largest>.+) N above noise of (?P<noise>.+) N\); .*",
+        "the force shows no contact (largest {largest} N above noise of {noise} N); give the force "
+        "at contact in the form below",
+        "die Kraft zeigt keine Berührung (höchstens {largest} N über einem Rauschen von {noise} N); "
+        "unten im Formular die Kraft bei Berührung angeben",
+    ),
+    _Fault(
+        r"the velocity of the actuator is not known(?P<why>.*); name the column .*",
+        "the velocity of the actuator is not known{why}; choose the column of the commanded one in "
+        "the form below, or give it for all shots there",
+        "die Geschwindigkeit des Antriebs ist nicht bekannt{why}; unten im Formular die Spalte der "
+        "befohlenen wählen oder sie dort für alle Stöße angeben",
+    ),
+)
+"""What `impactcell import` says, as patterns; what the page says in English, and in German."""
+REASONS: Final = (
+    (r": '(?P<column>.+)' holds text, as '(?P<text>.*)'", ": „{column}“ enthält Text, etwa „{text}“"),
+    (r": '(?P<column>.+)' goes forward in (?P<some>\d+) of (?P<all>\d+) steps only",
+     ": „{column}“ wächst nur in {some} von {all} Schritten"),
+    (r": its column changes within the record, so it was measured",
+     ": ihre Spalte ändert sich in der Aufzeichnung, ist also gemessen"),
+)  # fmt: skip
+NEEDED: Final = {"above 0": "über 0", "0 or above": "0 oder mehr", "1 or -1": "1 oder -1"}
+
+
+def page_fault(fault: str, language: str) -> tuple[str, str]:
+    """Give the language of a fault on the page, and the fault.
+
+    >>> page_fault("column 'Weg' (position) has no unit; say --unit 'Weg=m', or which it is", "de")
+    ('de', 'Spalte „Weg“ (Position) hat keine Einheit; unten im Formular angeben, etwa m')
+    """
+    for kind in FAULTS:
+        match = re.fullmatch(PLACE + kind.pattern, fault)
+        if match is None:
+            continue
+        said = {name: text or "" for name, text in match.groupdict().items()}
+        if language == "de":
+            said |= _in_german(said)
+        return language, said["place"] + (kind.german if language == "de" else kind.english).format_map(said)
+    return "en", fault
+
+
+def _in_german(said: dict[str, str]) -> dict[str, str]:
+    meaning, needed = said.get("meaning", ""), said.get("needed", "")
+    why = said.get("why", "")
+    for pattern, german in REASONS:
+        if (match := re.fullmatch(pattern, why)) is not None:
+            why = german.format_map(match.groupdict())
+    return {
+        "meaning": GERMAN_QUANTITIES.get(meaning, meaning),
+        "needed": NEEDED.get(needed, needed),
+        "reason": page_note(said.get("reason", ""), "de")[1],
+        "why": why,
+    }

@@ -1,0 +1,101 @@
+"""How the script of the page writes numbers: with the digits that are known, alike wherever they stand."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import impactcell.web
+from impactcell.records.uncertainty import TOLD_STDS
+from impactcell.web.messages import Messages
+from tests.browser.chromium import Browser
+
+pytestmark = pytest.mark.browser
+
+SCRIPT = Path(impactcell.web.__file__).parent / "static" / "live.js"
+LOAD = """
+    const [code, language, texts, toldStds] = arguments;
+    document.documentElement.lang = language;
+    document.body.dataset.toldStds = toldStds;
+    const json = Object.assign(document.createElement("script"), { type: "application/json", id: "texts" });
+    json.textContent = texts;
+    document.body.append(json);
+    document.head.append(Object.assign(document.createElement("script"), { textContent: code }));
+"""
+SHOW = """
+    const [path, form, card] = arguments, root = document.createElement("div");
+    root.innerHTML = '<b data-quantity="" data-unit="" data-form=""></b>';
+    Object.assign(root.firstChild.dataset, { quantity: path, form });
+    showValues(root, card);
+    return root.textContent;
+"""
+
+
+def load(browser: Browser, language: str) -> None:
+    code = SCRIPT.read_text().replace("export ", "")
+    texts = Messages(language).for_script()
+    browser.open("about:blank")
+    offered = "Object.assign(window, { showValues, cyclesLeft, showAlarm });"
+    browser.run(LOAD, f"{code}\n{offered}", language, json.dumps(texts), TOLD_STDS)
+
+
+def card(**values: Any) -> dict[str, Any]:
+    return {"values": {name.replace("__", "/"): value for name, value in values.items()}, "qualities": {}}
+
+
+@pytest.mark.parametrize(
+    ("language", "value", "std", "said"),
+    [
+        ("en", 0.56, 0.00055, "0.5600 ± 0.0011"),
+        ("de", 0.56, 0.00055, "0,5600 ± 0,0011"),
+        ("en", 0.2034, 0.0062, "0.203 ± 0.012"),
+        ("en", 0.2034, 0.000498, "0.2034 ± 0.0010"),
+        ("en", 4321.6, 60.0, "4322 ± 120"),
+    ],
+)
+def test_a_value_has_the_digits_of_what_stands_behind_it(
+    browser: Browser, language: str, value: float, std: float, said: str
+) -> None:
+    load(browser, language)
+    content = card(Wear__Level=value, Wear__LevelStdDev=std)
+    for form in ("coefficient", ""):
+        assert browser.run(SHOW, "Wear/Level", form, content) == said
+    told = Messages(language)
+    assert f"{told.beside_std(value, std)} ± {told.told_std(std)}" == said
+
+
+def test_cycles_that_are_left_are_whole_ones_and_the_same_everywhere(browser: Browser) -> None:
+    load(browser, "en")
+    content = card(
+        Wear__Level=0.2,
+        Wear__Limit=0.25,
+        Wear__CyclesToLimit=1234.9,
+        Wear__CyclesToLimitLow=987.6,
+        Wear__CyclesToLimitHigh=12345.6,
+    )
+    said = browser.run("return cyclesLeft(arguments[0])", content["values"])
+    assert said == "1234 (from 987 to 12,345)"
+    for path, part in (("", "1234"), ("Low", "987"), ("High", "12,345")):
+        assert browser.run(SHOW, f"Wear/CyclesToLimit{path}", "cycles", content) == part
+
+
+@pytest.mark.parametrize(
+    ("language", "said"),
+    [
+        ("en", "▲ Deviant cycle (not acknowledged): cleared; it said: friction is off"),
+        ("de", "▲ Abweichender Zyklus (nicht quittiert): vorbei; gemeldet war: Reibung passt nicht"),
+    ],
+)
+def test_an_alarm_that_has_cleared_says_what_it_said(browser: Browser, language: str, said: str) -> None:
+    load(browser, language)
+    script = """
+        const alarm = { name: "DeviantCycle", active: false, acknowledged: false, enabled: true, time_ms: 1 };
+        const evidence = { compared: {}, size: null, change_cycle: null };
+        Object.assign(alarm, { shelved: "unshelved", evidence });
+        alarm.message = { en: "friction is off", de: "Reibung passt nicht" };
+        const place = document.createElement("div");
+        showAlarm(place, [alarm], "");
+        return place.textContent;
+    """
+    assert browser.run(script) == said

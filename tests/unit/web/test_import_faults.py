@@ -1,0 +1,58 @@
+"""Faults of `impactcell import` as the page says them; made by import itself, so that none is missed here."""
+
+from pathlib import Path
+
+import pytest
+
+from impactcell.errors import MeasurementError
+from impactcell.measurements import Given, guess, make_campaign, read_tables
+from impactcell.measurements.given import read_given
+from impactcell.web.texts.import_faults import page_fault
+
+ZEROS = "".join(f"{n};0;0;3000\n" for n in range(60))
+"""A record in which nothing is struck."""
+NOTHING_GIVEN = Given()
+FILES = {
+    "nothing named": "a;b\n1;2\n2;3\n3;5\n",
+    "time as text": "Zeit;Kraft [N]\num eins;2\num zwei;3\num drei;5\n",
+    "time to and fro": "Zeit [s];Kraft [N]\n1;2\n0;3\n3;5\n2;7\n",
+    "no unit": "Zeit [ms];Kraft [N];Weg\n0;0;0\n1;1;1\n2;0;2\n3;0;3\n",
+    "unit of something else": "Zeit [ms];Kraft [mm];Weg [mm]\n0;0;0\n1;1;1\n2;0;2\n3;0;3\n",
+    "no contact": f"Zeit [ms];Kraft [N];Weg [mm];Geschwindigkeit [mm/min]\n{ZEROS}",
+    "two masses": "Zeit [ms];Kraft [N];Masse [kg]\n"
+    + "".join(f"{n};{n % 7};{n % 2 + 1}\n" for n in range(60)),
+    "no mass": "Zeit [ms];Kraft [N];Masse [kg]\n" + "".join(f"{n};{n % 7};-1\n" for n in range(60)),
+}
+
+
+def faults_of(directory: Path, text: str, given: Given = NOTHING_GIVEN) -> list[str]:
+    path = directory / "x.csv"
+    path.write_text(text, encoding="utf-8")
+    tables = read_tables(path)
+    mapping = guess(tables, given)
+    if mapping.faults:
+        return list(mapping.faults)
+    with pytest.raises(MeasurementError) as error:
+        make_campaign(tables, mapping)
+    return str(error.value).splitlines()
+
+
+@pytest.mark.parametrize("case", FILES)
+def test_a_fault_is_said_without_options_in_both_languages(tmp_path: Path, case: str) -> None:
+    faults = faults_of(tmp_path, FILES[case])
+    assert faults
+    for fault in faults:
+        for language in ("en", "de"):
+            spoken, said = page_fault(fault, language)
+            assert spoken == language, fault
+            assert "--" not in said, said
+            assert "form below" in said or "Formular" in said, said
+
+
+def test_a_rate_beside_times_is_told_to_have_no_use(tmp_path: Path) -> None:
+    rate = read_given({"constants": ["rate=10kHz"]})
+    (fault,) = faults_of(tmp_path, "Zeit [s];Kraft [N]\n0;2\n1;3\n2;5\n", rate)
+    assert page_fault(fault, "de") == (
+        "de",
+        "die Zeiten stehen in Spalte „Zeit“, die Abtastrate hat keinen Zweck; aus dem Formular nehmen",
+    )
