@@ -14,6 +14,7 @@ from impactcell.cell.pipeline import (
     start_batch,
     step,
 )
+from impactcell.cell.preprocessing import fill_defaults
 
 __all__ = [
     "PROVISIONAL",
@@ -23,6 +24,7 @@ __all__ = [
     "apply_event",
     "apply_rule_result",
     "expire_shelving",
+    "fill_defaults",
     "in_place_of",
     "initial_state",
     "migrate_state",

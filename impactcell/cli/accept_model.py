@@ -10,7 +10,8 @@ from typing import Any
 
 from impactcell.cell import in_place_of
 from impactcell.cli.calibrate import calibrated_model
-from impactcell.errors import SettingsError
+from impactcell.cli.own_taps import compare_on_own_taps
+from impactcell.errors import PredictionError, SettingsError
 from impactcell.prediction import Model
 from impactcell.process.console import print_note, print_result
 from impactcell.settings import CellConfig, read_cell
@@ -21,28 +22,41 @@ PLANT_PARAMETERS = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
 """What a model says of the plant beside its effects."""
 
 
-def accept_model(cell: Path, extended: Path, *, as_json: bool = False) -> None:
+def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: bool = False) -> None:
     """Calibrate an extended model for the cell and put it in the place of the cell's model file.
 
     The model that it replaces is kept beside it as `<name>.previous.yaml`. A running service sees the new
-    file within a second and goes on with it from the next cycle; tracker, alarms and journal stay.
+    file within a second and goes on with it from the next cycle; tracker, alarms and journal stay. One with
+    which the cell's own last taps fit clearly worse is put into service only `anyway`.
 
     Raises
     ------
     SettingsError
         A file cannot be read or written.
     PredictionError
-        The part would not slide free over the calibrated range.
+        The part would not slide free over the calibrated range, or the cell's own taps speak against it.
+    JournalError
+        The cell's journal cannot be read.
     """
     cell_config = read_cell(cell)
     model = calibrated_model(replace(cell_config, model=read_model(extended)))
+    own_taps = compare_on_own_taps(cell_config, model)
+    if own_taps is not None and own_taps.speaks_against and not anyway:
+        told = f"model {model.name} is not put into service (--anyway would)"
+        raise PredictionError(f"{cell_config.name}: {told}: {own_taps.sentence}")
     previous = put_into_service(cell_config, model)
     for finding in judge_cell(read_cell(cell)):
         if finding.is_fault:
             print_note(str(finding))
     _tell(
-        {"cell": cell_config.name, "model": model.name, "previous": str(previous)},
-        f"{cell_config.name} runs with model {model.name} from the next cycle on; before: {previous}",
+        {
+            "cell": cell_config.name,
+            "model": model.name,
+            "previous": str(previous),
+            "own_taps": None if own_taps is None else own_taps.content,
+        },
+        f"{cell_config.name} runs with model {model.name} from the next cycle on; before: {previous}"
+        + ("" if own_taps is None else f"\n{own_taps.sentence}"),
         as_json=as_json,
     )
 

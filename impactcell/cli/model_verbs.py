@@ -18,6 +18,9 @@ def model_accept(
     ],
     *,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would change.")] = False,
+    anyway: Annotated[
+        bool, typer.Option("--anyway", help="Also if the cell's own last taps speak against it.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Put an extended model into service; a running cell takes it over without losing its state."""
@@ -26,7 +29,7 @@ def model_accept(
     if dry_run:
         compare_models(cell, extended, as_json=as_json)
     else:
-        accept_model(cell, extended, as_json=as_json)
+        accept_model(cell, extended, anyway=anyway, as_json=as_json)
 
 
 @verb(model, "fit")

@@ -34,8 +34,13 @@ class StoredCapture:
     blob: bytes | None
 
 
-def stored_captures(database: sqlite3.Connection) -> Iterator[StoredCapture]:
+def stored_captures(database: sqlite3.Connection, newest: int | None = None) -> Iterator[StoredCapture]:
     """Yield all captures in their order; after a page that cannot be read it goes on behind it.
+
+    Parameters
+    ----------
+    newest : int, optional
+        Only the last so many.
 
     Raises
     ------
@@ -43,7 +48,7 @@ def stored_captures(database: sqlite3.Connection) -> Iterator[StoredCapture]:
         If not even the last one can be found.
     """
     last = _last(database)
-    seq = 1
+    seq = 1 if newest is None else max(last - newest + 1, 1)
     while seq <= last:
         try:
             row = database.execute(_NEXT, (seq,)).fetchone()

@@ -204,6 +204,7 @@ class Journal:
         first_cycle: int | None = None,
         last_cycle: int | None = None,
         damaged: Callable[[str], None] | None = None,
+        newest: int | None = None,
     ) -> Iterator[Capture]:
         """Yield the stored captures in order of their cycles; those that were dropped are gone.
 
@@ -213,6 +214,8 @@ class Journal:
             Both included.
         damaged : callable, optional
             Told of each capture that cannot be read, by its cycle; the others follow.
+        newest : int, optional
+            Only of the last so many.
 
         Raises
         ------
@@ -220,7 +223,7 @@ class Journal:
             At the first that cannot be read, without `damaged`.
         """
         with errors(self.path):
-            for stored in stored_captures(self._db):
+            for stored in stored_captures(self._db, newest):
                 if not (first_cycle or 0) <= stored.cycle <= (math.inf if last_cycle is None else last_cycle):
                     continue
                 try:

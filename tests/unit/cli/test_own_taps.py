@@ -1,0 +1,119 @@
+"""A model that the cell's own last taps speak against is not put into service unasked."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from impactcell.cli.app import run_verb
+from impactcell.cli.own_taps import TAPS, OwnTaps, compare_on_own_taps
+from impactcell.errors import PredictionError
+from impactcell.journal.store import Journal
+from impactcell.prediction import Model
+from impactcell.settings import read_cell
+from impactcell.settings.model_file import write_model
+from tests.integration.processes import CONFIG
+from tests.snapshots import make_snapshot
+from tests.taps import Tap
+
+CELL = """
+format: 1
+cell: own
+module: {{host: 127.0.0.1, port: 5020, register_map: {maps}/fpga-v1.yaml}}
+model: model.yaml
+part: {{mass_kg: 18.9}}
+actuator: {{stroke_mm: 1.5}}
+alarms: {{wear_limit: 0.25}}
+opcua: {{users_file: users.yaml}}
+journal: {{file: own.sqlite}}
+"""
+
+
+def oily(model: Model) -> Model:
+    """The same plant in thick oil, of which the cell knows nothing."""
+    effects = {"viscous_friction": {"viscous_coefficient_n_s_per_m": 300.0}}
+    return replace(model, plant=replace(model.plant, effects=effects), name="in oil")
+
+
+@pytest.fixture
+def cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Cell whose journal holds more taps than are looked at, the first of them of another plant."""
+    monkeypatch.setattr("impactcell.cli.accept_model.calibrated_model", lambda config: config.model)
+    model = read_cell(CONFIG / "cells" / "prototype.yaml").model
+    write_model(model, tmp_path / "model.yaml")
+    (tmp_path / "cell.yaml").write_text(CELL.format(maps=CONFIG / "maps"))
+    with Journal(tmp_path / "own.sqlite", "own") as journal:
+        for cycle in range(1, TAPS + 4):
+            draw = np.random.default_rng([cycle, 3])
+            mu_s = 0.2 if cycle > 3 else 0.4
+            tap = Tap(0.06, mu_s * (1.0 + 0.01 * draw.standard_normal()), stroke_m=1.5e-3)
+            journal.append(
+                replace(tap.capture(draw, cycle=cycle), session=1),
+                make_snapshot(tap.capture(draw, cycle=cycle)),
+                b"",
+                (),
+            )
+    return tmp_path / "cell.yaml"
+
+
+def test_the_last_taps_of_the_journal_are_asked(cell: Path) -> None:
+    config = read_cell(cell)
+    own = compare_on_own_taps(config, oily(config.model))
+    assert own is not None
+    assert own.taps == TAPS
+    assert own.gap_before == pytest.approx(1.0, abs=0.15)
+    assert own.gap_after > 2.0
+    assert own.usable_before == TAPS
+    assert own.speaks_against
+    same = compare_on_own_taps(config, config.model)
+    assert same is not None
+    assert same.gap_after == same.gap_before
+    assert not same.speaks_against
+
+
+def test_a_model_of_another_plant_is_put_into_service_only_if_that_is_meant(
+    cell: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other, before = cell.parent / "other.yaml", read_cell(cell).model
+    write_model(oily(before), other)
+    with pytest.raises(PredictionError, match=r"\(--anyway would\): of the cell's last 30 taps it leaves"):
+        run_verb(["model", "accept", str(cell), str(other)])
+    assert read_cell(cell).model == before
+    with pytest.raises(SystemExit) as ended:
+        run_verb(["model", "accept", str(cell), str(other), "--anyway", "--json"])
+    assert ended.value.code == 0
+    told = json.loads(capsys.readouterr().out)["own_taps"]
+    assert told["taps"] == TAPS
+    assert told["gap_after"] > 1.5 * told["gap_before"]
+    assert read_cell(cell).model.name == "in oil"
+
+
+def test_a_cell_without_taps_of_its_own_takes_any_model(
+    cell: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (cell.parent / "own.sqlite").unlink()
+    other = cell.parent / "other.yaml"
+    write_model(oily(read_cell(cell).model), other)
+    with pytest.raises(SystemExit) as ended:
+        run_verb(["model", "accept", str(cell), str(other), "--json"])
+    assert ended.value.code == 0
+    assert json.loads(capsys.readouterr().out)["own_taps"] is None
+
+
+@pytest.mark.parametrize(
+    ("after", "usable", "against"),
+    [(1.4, 30, False), (1.6, 30, True), (1.0, 14, True), (1.0, 15, False), (math.nan, 30, True)],
+)
+def test_what_speaks_against_a_model(after: float, usable: int, *, against: bool) -> None:
+    own = OwnTaps(30, 1.0, after, 30, usable)
+    assert own.speaks_against is against
+    assert (own.content["gap_after"] is None) is math.isnan(after)
+    assert ("can follow none" in own.sentence) is math.isnan(after)
+
+
+def test_where_neither_model_follows_a_tap_the_new_one_is_not_to_blame() -> None:
+    assert not OwnTaps(5, math.nan, math.nan, 0, 0).speaks_against
+    assert not OwnTaps(5, 7.0, 8.0, 5, 5).speaks_against
