@@ -21,6 +21,7 @@ from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.texts import CATALOGUE, LANGUAGES
 from impactcell.web.texts.import_faults import page_fault
 from impactcell.web.texts.import_notes import page_note
+from impactcell.web.texts.model_faults import model_fault
 from impactcell.web.texts.reasons import english_reason, german_reason
 
 LEAST_WHOLE = 9.95
@@ -144,8 +145,9 @@ class Messages:
         return page_note(note, self.language)
 
     def fault(self, fault: str) -> tuple[str, str]:
-        """Say why dropped files cannot be read, after the language in which it is said."""
-        return page_fault(fault, self.language)
+        """Say why files cannot be read or a model is refused, after the language in which it is said."""
+        refusal = model_fault(fault, self.language)
+        return page_fault(fault, self.language) if refusal is None else (self.language, refusal)
 
     def step(self, name: str) -> str:
         """Name a step of a study."""

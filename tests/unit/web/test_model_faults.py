@@ -1,0 +1,37 @@
+"""A model that is refused is told on the page in its language, from what `model accept` says."""
+
+import math
+
+import pytest
+
+from impactcell.cli.own_taps import OwnTaps
+from impactcell.web.messages import Messages
+
+
+def refusal(own: OwnTaps) -> str:
+    return f"press-1: model oil is not put into service (--anyway would): {own.sentence}"
+
+
+def test_both_figures_and_the_way_out_are_said_in_either_language() -> None:
+    told = refusal(OwnTaps(30, 1.0, 7.123, 30, 2))
+    language, german = Messages("de").fault(told)
+    assert language == "de"
+    assert german == (
+        "press-1: Modell oil wird nicht übernommen, denn die eigenen Stöße der Zelle sprechen dagegen: "
+        "bei den letzten 30 lässt es das 7,12-Fache des Sensorrauschens übrig, 2 Schätzungen sind "
+        "brauchbar; das jetzige Modell lässt das 1-Fache des Sensorrauschens übrig, 30 sind es. Sind die "
+        "Messungen aus dieser Zelle? Soll das Modell dennoch gelten: „impactcell model accept --anyway“."
+    )
+    language, english = Messages("en").fault(told)
+    assert language == "en"
+    assert (
+        "of the last 30 it leaves 7.12 times the sensors' noise, 2 estimates are usable; the model in"
+        in english
+    )
+
+
+@pytest.mark.parametrize(
+    ("language", "said"), [("en", "it can follow none"), ("de", "kann es keinem folgen")]
+)
+def test_taps_that_no_model_follows_are_said_to_be_such(language: str, said: str) -> None:
+    assert said in Messages(language).fault(refusal(OwnTaps(5, math.nan, math.nan, 5, 1)))[1]
