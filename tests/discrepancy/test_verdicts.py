@@ -182,6 +182,13 @@ def test_an_effect_beside_another_has_a_name_only_where_that_leaves_more_than_a_
     first, both = leaving(viscous, without), leaving(viscous, 1.0)
     assert measure.change(first, both).is_real()
     assert list(confirmed(measure, nested(nominal, a=first, b=nominal, ab=both))) == named
+    # One that acts in a few shots shows in those that the model was fitted to, if not in those held out.
+    seen_in_training = confirmed(
+        measure,
+        nested(nominal, a=first, b=nominal, ab=both),
+        trained=lambda effects: 3.0 * ("b" not in effects),
+    )
+    assert list(seen_in_training) == ["a", "b"]
     # Nor has it one by itself, where the search took it for one of several.
     assert list(confirmed(measure, nested(first, a=both, ab=both))) == ["a"] * (len(named) - 1)
 

@@ -1,6 +1,6 @@
 """Which effects held-out shots confirm: each has to close a part of the gap."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import takewhile
 
@@ -56,7 +56,12 @@ class NestedModels:
         return self.models.get(frozenset(self.added) - {effect})
 
 
-def confirmed(measure: GapMeasure, nested: NestedModels, max_p: float = MAX_P_VALUE) -> dict[str, GapChange]:
+def confirmed(
+    measure: GapMeasure,
+    nested: NestedModels,
+    max_p: float = MAX_P_VALUE,
+    trained: Callable[[frozenset[str]], float] = lambda _: 0.0,
+) -> dict[str, GapChange]:
     """Effects that held-out shots confirm, each with what it closes of what those before it leave.
 
     Of several effects it may be that one is not seen while another is missing: then each is asked what it
@@ -70,25 +75,32 @@ def confirmed(measure: GapMeasure, nested: NestedModels, max_p: float = MAX_P_VA
         Fitted to each held-out shot.
     max_p : float
         One-sided error for each of them.
+    trained : callable
+        Gap of the traces that a model with some effects leaves of the training shots: an effect that acts in
+        a few shots may be in none of those held out.
     """
     changes = _confirmed(measure, nested, max_p)
     if len(nested.added) < 2:
         return changes
-    while (hidden := _least_visible(measure, replace(nested, added=tuple(changes)))) is not None:
+    while (hidden := _least_visible(measure, replace(nested, added=tuple(changes)), trained)) is not None:
         seen = tuple(effect for effect in changes if effect != hidden)
         changes = _confirmed(measure, replace(nested, added=seen), max_p)
     return changes
 
 
-def _least_visible(measure: GapMeasure, nested: NestedModels) -> str | None:
+def _least_visible(
+    measure: GapMeasure, nested: NestedModels, trained: Callable[[frozenset[str]], float]
+) -> str | None:
     """Effect without which the others leave least, if that is next to nothing; else None."""
-    without = {effect: model for effect in nested.added if (model := nested.without(effect)) is not None}
-    gaps = {effect: measure.gap(model) for effect, model in without.items()}
-    whole = measure.gap(nested.largest)
-    hidden = [
-        effect for effect, gap in gaps.items() if gap.trace < VISIBLE_BESIDE and not narrows(gap, whole)
-    ]
-    return min(hidden, key=lambda effect: gaps[effect].trace, default=None)
+    whole, least = measure.gap(nested.largest), dict[str, float]()
+    for effect in nested.added:
+        model = nested.without(effect)
+        if model is None or narrows(gap := measure.gap(model), whole):
+            continue
+        left = max(gap.trace, trained(frozenset(nested.added) - {effect}))
+        if left < VISIBLE_BESIDE:
+            least[effect] = left
+    return min(least, key=least.__getitem__, default=None)
 
 
 def _confirmed(measure: GapMeasure, nested: NestedModels, max_p: float) -> dict[str, GapChange]:

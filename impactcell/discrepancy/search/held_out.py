@@ -72,7 +72,9 @@ class OpenedShots:
         replicates = self._replicates(nested.largest, held_nested.largest)
         measure = GapMeasure(held_problem, self.floor, replicates, self.seed)
         training = GapMeasure(problem, self.floor, replicates, self.seed)
-        changes = confirmed(measure, held_nested, max_p)
+        changes = confirmed(
+            measure, held_nested, max_p, lambda effects: training.gap(nested.models[effects]).trace
+        )
         nominal, held_nominal = nested.nominal, held_nested.nominal
         final, held_final = nested.models[frozenset(changes)], held[frozenset(changes)]
         parts = counted_parts(measure, (held_nominal, held_final), changes.values())
