@@ -31,7 +31,7 @@ CHANGES = {60: 0.05, 300: 0.012, 500: -0.03}
 ANNOUNCED, OUTLIER = 300, 30
 """... one of which begins another batch, said to be one; and a cycle that is an outlier."""
 
-_lock = threading.Lock()
+_lock, _changes_lock = threading.Lock(), threading.Lock()
 _warm: set[tuple[object, ...]] = set()
 
 
@@ -52,9 +52,12 @@ def warm_up(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> Non
 
 
 def warm_up_for_changes(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> None:
-    """Take a series with wear, changes and an outlier through the tracker, and forget it; as `warm_up`."""
+    """Take a series with wear, changes and an outlier through the tracker, and forget it.
+
+    Once a process, as `warm_up`; no other cell's first cycle waits for it.
+    """
     kind = ("changes", design.tracker.batch)
-    with _lock:
+    with _changes_lock:
         if kind not in _warm and _run_series(design.tracker, stop):
             _warm.add(kind)
 

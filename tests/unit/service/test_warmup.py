@@ -12,10 +12,12 @@ import pytest
 from impactcell.cell import CellDesign
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
+from impactcell.service import warmup
 from impactcell.service.factory import cell_design
 from impactcell.service.worker import CellWorker
 from impactcell.settings import read_cell
 from tests.integration.processes import CONFIG
+from tests.patience import PATIENCE_S
 
 COMPILES_NOTHING_MORE = """
 import gc
@@ -77,3 +79,29 @@ async def test_cycles_do_not_wait_for_what_only_a_change_needs(
     may_end.set()
     await ended.wait()
     await worker.close()
+
+
+def test_no_other_cell_waits_for_its_first_cycle_while_one_compiles_for_changes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    begun, may_end = threading.Event(), threading.Event()
+
+    def compiling(*_: object) -> bool:
+        begun.set()
+        return may_end.wait()
+
+    monkeypatch.setattr(warmup, "_warm", set())
+    monkeypatch.setattr(warmup, "_run_series", compiling)
+    monkeypatch.setattr(warmup, "_run_cycles", lambda *_: False)
+    design = cell_design(read_cell(CONFIG / "cells" / "prototype.yaml"))
+    first = threading.Thread(target=warmup.warm_up_for_changes, args=(design,))
+    second = threading.Thread(target=warmup.warm_up, args=(design,), daemon=True)
+    first.start()
+    begun.wait()
+    second.start()
+    second.join(PATIENCE_S)
+    waited = second.is_alive()
+    may_end.set()
+    first.join()
+    second.join()
+    assert not waited
