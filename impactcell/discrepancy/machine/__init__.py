@@ -17,7 +17,7 @@ from impactcell.discrepancy.machine.selection import SelectionStep
 from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE, Term
 from impactcell.discrepancy.machine.trials import ChosenTerm, Trial
-from impactcell.discrepancy.machine.weak_form import ECCENTRICITY
+from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, shape_grid
 
 __all__ = [
     "CATALOGUE",
@@ -43,6 +43,7 @@ __all__ = [
     "drifts",
     "investigate_machine",
     "motions",
+    "shape_grid",
     "simulate_held_out",
     "term_of",
 ]

@@ -17,6 +17,7 @@ from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
 from impactcell.discrepancy.machine.regression import Blocks
 from impactcell.discrepancy.machine.remainder import remainder_of
 from impactcell.discrepancy.machine.selection import SelectionStep, select_terms
+from impactcell.discrepancy.machine.shape_intervals import with_shape_intervals
 from impactcell.discrepancy.machine.ties import still_tied
 from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch
 from impactcell.discrepancy.machine.weak_form import Column
@@ -79,7 +80,7 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
         unconfirmed=tuple(term.choice.name for term in proposed if term.choice.name not in falls),
         falls=falls,
         nominal=nominal,
-        final=final,
+        final=with_shape_intervals(fits, final),
         training=training,
         held_out=held_out,
         train_gaps=(gap(training, nominal), gap(settled[0], final)),

@@ -1,7 +1,7 @@
 """What an investigation with a base model found: models before and after, and the proof."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from impactcell.discrepancy.laws import FittedFunction
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
@@ -64,6 +64,9 @@ class FittedModel:
     delay_s : float
     gravity : float
         G.
+    shape_intervals : mapping
+        95 % interval of the shape of each term that has one, by the term's name; empty as long as shapes
+        are being compared.
     """
 
     base: BaseModel
@@ -71,6 +74,7 @@ class FittedModel:
     fit: LinearFit
     delay_s: float
     gravity: float
+    shape_intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def value(self, column: Column) -> float:
         """Coefficient of a column; 0 where the model does not have it."""

@@ -13,6 +13,7 @@ from impactcell.discrepancy.machine import (
     FittedModel,
     MachineFinding,
     OpenLoopError,
+    shape_grid,
     term_of,
 )
 from impactcell.discrepancy.report.machine_parameters import SYMBOLS, parameter_name
@@ -213,8 +214,19 @@ def _parameters(finding: MachineFinding, chosen: ChosenTerm, *, in_full: bool = 
     if term.shape is not None:
         per_s = "_per_s" if term.shape.covariate == "speed" else ""
         name = f"{term.shape.name}_{SYMBOLS[finding.base.coordinate]['q']}{per_s}"
-        document[prefix + name] = {"value": round_digits(chosen.shape), "ci95": None, "at_bound": False}
+        document[prefix + name] = _shape(finding, chosen)
     return document
+
+
+def _shape(finding: MachineFinding, chosen: ChosenTerm) -> dict[str, Any]:
+    """Shape of a term with its interval; an end that the records do not tell is null."""
+    ends = finding.final.shape_intervals[chosen.choice.name]
+    grid = shape_grid(term_of(chosen.choice), finding.scale)
+    return {
+        "value": round_digits(chosen.shape),
+        "ci95": [round_digits(end) if 0.0 < end < math.inf else None for end in ends],
+        "at_bound": chosen.shape in (grid[0], grid[-1]),
+    }
 
 
 def _nuisances(model: FittedModel) -> dict[str, Any]:

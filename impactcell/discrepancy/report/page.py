@@ -64,8 +64,12 @@ def report_environment(said: ModuleType) -> Environment:
 
 
 def format_number(value: float) -> str:
-    """Five digits, and an exponent only where the number could not be read without."""
-    text = f"{value:.5g}"
+    """Five digits, and an exponent only where the number could not be read without; no minus before nought.
+
+    >>> [format_number(value) for value in (-0.0, 1234567.0, 2.5e-7)]
+    ['0', '1 234 600', '2.5e-07']
+    """
+    text = f"{value + 0.0:.5g}"
     return format_thousands(float(text), 0) if "e+" in text and abs(value) < 1e7 else text
 
 
