@@ -56,9 +56,7 @@ def _discard_half_made(error: BaseException | None) -> None:
             if not frame.f_globals.get("__name__", "").startswith("asammdf."):
                 continue
             half_made: Any = frame.f_locals.get("self")
-            parts: list[Any] = [
-                getattr(half_made, name, None) for name in ("_tempfile", "_mapped_file", "_file")
-            ]
+            parts: list[Any] = [getattr(half_made, name, None) for name in _OPENED]
             parts += [local for local in frame.f_locals.values() if isinstance(local, io.IOBase)]
             for part in parts:
                 with contextlib.suppress(Exception):  # whatever it is, or has become

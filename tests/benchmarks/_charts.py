@@ -14,7 +14,6 @@ from impactcell.numerics.jit import compiled
 
 EWMA_LAMBDA = 0.1
 CUSUM_SLACK = 0.5
-GLR_WINDOW = 300
 
 
 @functools.cache

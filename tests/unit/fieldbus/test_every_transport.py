@@ -18,8 +18,6 @@ from simulator.faults import Fault, FaultInjector, FaultKind
 from tests.transports import KINDS, STREAMS, Image, connected, link_to, server_for
 
 every = pytest.mark.parametrize("kind", KINDS)
-LEGAL = (FaultKind.JOINED, FaultKind.SPLIT, FaultKind.JITTER, FaultKind.DELAY)
-"""What has to be understood."""
 
 
 @every
