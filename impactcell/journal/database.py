@@ -83,7 +83,13 @@ def _io_error(path: Path, error: sqlite3.OperationalError) -> JournalUnavailable
 
 
 def check_name(path: Path) -> None:
-    """Refuse what no file can be called; the system would not say which name it was."""
+    """Refuse what no file can be called; the system would not say which name it was.
+
+    Raises
+    ------
+    JournalError
+        The name holds what no name of a file can.
+    """
     try:
         possible = b"\0" not in os.fsencode(path)
     except UnicodeEncodeError:

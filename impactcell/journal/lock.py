@@ -17,6 +17,11 @@ def lock_journal(path: Path) -> IO[str]:
     is neither waited for nor written to. What is no plain file is refused, and so is one with a second name
     (a hard link): SQLite keeps a log for each name, and what one log holds is not in the file under the other
     (SQLite, How To Corrupt An SQLite Database File, section 2.5).
+
+    Raises
+    ------
+    JournalError
+        Another service holds it, or the path is no plain file with one name.
     """
     file = Path(os.path.realpath(path))
     with contextlib.suppress(FileNotFoundError):

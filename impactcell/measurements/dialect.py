@@ -122,6 +122,11 @@ def detect(lines: Sequence[str], given: Dialect) -> tuple[str, str, str]:
 
     The pair wins under which most lines have equally many cells and most cells are numbers; then the one with
     more columns, with fewer numbers that need a separator of thousands, and the likelier delimiter.
+
+    Raises
+    ------
+    MeasurementError
+        The given delimiter is the decimal mark, too.
     """
     sample = later_lines([line for line in lines if line.strip()])
     delimiters = DELIMITERS if given.delimiter is None else {given.delimiter: given.delimiter}

@@ -103,7 +103,13 @@ class _Rows:
         self._fault_count = 0
 
     def read(self) -> tuple[list[Samples | list[str]], Lines]:
-        """Columns, and the line of each row."""
+        """Columns, and the line of each row.
+
+        Raises
+        ------
+        MeasurementError
+            A row has another width or a cell is no finite number; the first faults are told by their lines.
+        """
         parts: list[list[Samples | list[str]]] = []
         numbers: list[int] = []
         for chunk in self._chunks():

@@ -106,7 +106,13 @@ class Ensemble:
         return other
 
     def parameters(self, plant: Plant) -> Samples:
-        """Parameter vector of `plant`, shape (len(names),); its effects must be among the ensemble's."""
+        """Give the parameter vector of `plant`, shape (len(names),).
+
+        Raises
+        ------
+        PhysicsError
+            The plant has effects that the ensemble was made without.
+        """
         unknown = set(plant.effects) - {effect.identifier for effect in self._table.effects}
         if unknown:
             raise PhysicsError(f"the ensemble was made without {', '.join(sorted(unknown))}")

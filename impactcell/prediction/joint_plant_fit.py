@@ -128,6 +128,11 @@ def contact_constants(tap: Features) -> tuple[float, float]:
 
     The rate comes from a spline-free derivative of the position: a polynomial over the contact, which is
     smooth enough for a start.
+
+    Raises
+    ------
+    PredictionError
+        The contact has fewer than twelve samples of the position.
     """
     capture, slide = tap.capture, required(tap.slide)
     force, position = required(tap.force), required(tap.position)

@@ -10,7 +10,13 @@ log = logging.getLogger(__name__)
 
 
 def notify(state: str) -> bool:
-    """Send `state`, as in `READY=1`, to the service manager; False where there is none."""
+    """Send `state`, as in `READY=1`, to the service manager; False where there is none.
+
+    Raises
+    ------
+    SettingsError
+        `NOTIFY_SOCKET` is no address of a socket.
+    """
     address = os.environ.get("NOTIFY_SOCKET")
     if not address:
         return False

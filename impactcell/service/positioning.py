@@ -135,7 +135,13 @@ class PositioningTask:
         self._wake.set()
 
     async def abort(self, by: str) -> None:
-        """Stop the task that runs, and the tap that is being executed; nothing happens where none runs."""
+        """Stop the task that runs, and the tap that is being executed; nothing happens where none runs.
+
+        Raises
+        ------
+        PositioningError
+            No further tap is commanded, but the module could not be told so.
+        """
         if not self._sequence.running:
             return
         self._set_sequence(task_state_machine.aborted(self._sequence, by))
