@@ -22,18 +22,20 @@ _AT_ONCE: Final = 16
 """Bytes that come out together, as out of the FIFO of a UART."""
 _SILENCE: Final = 3.5
 """Characters of silence that end a frame."""
+_BITS: Final = 11
+"""Of a character: start bit, eight data bits, parity and stop bit."""
 
 Pace = Callable[[int], float]
 """Seconds that so many characters take."""
 
 
-def pace_of(baudrate: int, *, bits: int = 11) -> Pace:
-    """Give the pace of a line; a character has start bit, eight data bits, parity and stop bit.
+def pace_of(baudrate: int) -> Pace:
+    """Give the pace of a line.
 
     >>> round(pace_of(115_200)(256), 5)
     0.02444
     """
-    return lambda characters: characters * bits / baudrate
+    return lambda characters: characters * _BITS / baudrate
 
 
 def no_time(_: int) -> float:

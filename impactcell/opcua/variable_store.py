@@ -112,21 +112,14 @@ class VariableStore:
         """Replace the value and tell all who watch it."""
         self.variable(node).write(data)
 
-    def set_value(
-        self,
-        node: ua.NodeId,
-        value: object,
-        kind: ua.VariantType,
-        time: datetime,
-        status: ua.StatusCode = GOOD,
-    ) -> None:
-        """Replace value, status and source timestamp."""
-        self.write(node, ua.DataValue(ua.Variant(value, kind), status, time, datetime.now(UTC)))
+    def set_value(self, node: ua.NodeId, value: object, kind: ua.VariantType, time: datetime) -> None:
+        """Replace value and source timestamp; the status is Good."""
+        self.write(node, ua.DataValue(ua.Variant(value, kind), GOOD, time, datetime.now(UTC)))
 
     def add_observer(self, node: ua.NodeId, observer: ValueObserver) -> None:
         """Call `observer` with every value written from now on."""
         self.variable(node).observers[observer] = None
 
     def remove_observer(self, node: ua.NodeId, observer: ValueObserver) -> None:
-        """Undo `watch`."""
+        """Undo `add_observer`."""
         self.variable(node).observers.pop(observer, None)

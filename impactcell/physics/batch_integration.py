@@ -21,10 +21,8 @@ def undriven(parameters: Samples, laws: IntArray) -> TapArrays:
     return TapArrays(parameters, laws, NO_SAMPLES, np.zeros(parameters.shape[0] + 1, dtype=np.int64))
 
 
-def sample_taps(
-    taps: TapArrays, sample_index: IntArray, times: Samples, horizon_s: float = MAX_DURATION_S
-) -> Samples:
-    """Integrate taps as far as they are sampled.
+def sample_taps(taps: TapArrays, sample_index: IntArray, times: Samples) -> Samples:
+    """Integrate taps as far as they are sampled; after `MAX_DURATION_S` everything stays as it is.
 
     Parameters
     ----------
@@ -33,8 +31,6 @@ def sample_taps(
         Where in `times` the samples of each tap and channel begin and end.
     times : ndarray, shape (samples,)
         Ascending within each tap's channel.
-    horizon_s : float
-        After which everything is taken to stay as it is.
 
     Returns
     -------
@@ -44,12 +40,12 @@ def sample_taps(
     samples = np.zeros(times.size)
     outputs = np.empty((taps.parameters.shape[0], at.OUTPUT_COUNT))
     asked = SampleArrays(sample_index.copy(), times, samples, NO_KINDS, NO_SAMPLES)
-    integrate_taps(taps[:], asked[:], outputs, horizon_s, at.TO_LAST_SAMPLE)
+    integrate_taps(taps[:], asked[:], outputs, MAX_DURATION_S, at.TO_LAST_SAMPLE)
     return samples
 
 
-def integrate_to_rest(taps: TapArrays, horizon_s: float = MAX_DURATION_S) -> Samples:
-    """Integrate taps for their outputs, shape (n, OUTPUT_COUNT), without any samples."""
+def integrate_to_rest(taps: TapArrays, horizon_s: float) -> Samples:
+    """Integrate taps for their outputs, shape (n, OUTPUT_COUNT), without any samples, up to `horizon_s`."""
     count = taps.parameters.shape[0]
     outputs = np.empty((count, at.OUTPUT_COUNT))
     nothing = np.zeros((count, at.SAMPLE_INDEX_COUNT), dtype=np.int64)

@@ -17,7 +17,6 @@ from impactcell.discrepancy.model.parameters import Coordinate
 from impactcell.discrepancy.model.problem import FitState, Problem, total_cost
 from impactcell.discrepancy.model.shot_fits import (
     PINNED_SPREAD,
-    THOROUGH_STEPS,
     better_per_shot,
     fit_shot_parameters,
     initialise,
@@ -236,9 +235,9 @@ def refit_shot_parameters(problem: Problem, model: Fit) -> Fit:
     return replace(model, shot_parameters=state.shot_parameters, residual=state.residual)
 
 
-def initial_shot_parameters(problem: Problem, theta: Samples, steps: int = THOROUGH_STEPS) -> ShotParameters:
+def initial_shot_parameters(problem: Problem, theta: Samples) -> ShotParameters:
     """Fit what every shot has of its own from several starts; the best of them shot by shot."""
-    return initialise(problem, theta, POLICY.first_spread, steps=steps).shot_parameters
+    return initialise(problem, theta, POLICY.first_spread).shot_parameters
 
 
 def promised_fall(problem: Problem, model: Fit) -> float:
