@@ -12,14 +12,12 @@ from impactcell.cell import in_place_of
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.own_taps import compare_on_own_taps
 from impactcell.errors import PredictionError, SettingsError
+from impactcell.physics import NOMINAL_PARAMETERS
 from impactcell.prediction import Model
 from impactcell.process.console import print_note, print_result
 from impactcell.settings import CellConfig, read_cell
 from impactcell.settings.judgement import judge_cell
 from impactcell.settings.model_file import read_model, write_model
-
-PLANT_PARAMETERS = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
-"""What a model says of the plant beside its effects."""
 
 
 def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: bool = False) -> None:
@@ -128,7 +126,7 @@ def previous_model(model_file: Path) -> Path:
 
 
 def _parameters(model: Model) -> Iterator[tuple[str, float | list[float]]]:
-    for name in PLANT_PARAMETERS:
+    for name in NOMINAL_PARAMETERS:
         yield name, getattr(model.plant, name)
     for effect, parameters in model.plant.effects.items():
         for name, value in parameters.items():

@@ -16,7 +16,10 @@ from impactcell.physics.effects import find_effect
 from impactcell.physics.plant import Plant, TapInput
 from impactcell.records import Samples
 
-NOMINAL_PARAMETERS = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
+_TYPICAL_OF_NOMINAL = {"stiffness_n_per_m": 6.5e5, "damping_n_s_per_m": 465.0, "mu_s": 0.2, "mu_k": 0.15}
+"""Typical magnitudes of the nominal parameters, about those of the paper's plant."""
+NOMINAL_PARAMETERS = tuple(_TYPICAL_OF_NOMINAL)
+"""What a plant has beside its effects, in the order of every vector of parameters."""
 MAX_EFFECT_STATES = at.STATE_WIDTH - at.FIRST_EXTRA_STATE
 _TAP_COLUMNS = (
     *("velocity_m_s", "mass_kg", "stroke_m", "direction", "halts_at_separation", "start_m", "dwell_s"),
@@ -230,11 +233,16 @@ def column_key(name: str) -> str:
 
 
 def parameter_range(name: str) -> tuple[float, float, float]:
-    """Lower and upper end of a parameter's range, and its typical magnitude, by its name in `names`."""
-    if "." not in name:
-        typical = {"stiffness_n_per_m": 6.5e5, "damping_n_s_per_m": 465.0, "mu_s": 0.2, "mu_k": 0.15}[name]
-        return 0.0, math.inf, typical
-    identifier, rest = name.split(".", 1)
+    """Lower and upper end of a parameter's range, and its typical magnitude, by its name in `names`.
+
+    Raises
+    ------
+    PhysicsError
+        No parameter is called so.
+    """
+    if name in _TYPICAL_OF_NOMINAL:
+        return 0.0, math.inf, _TYPICAL_OF_NOMINAL[name]
+    identifier, _, rest = name.partition(".")
     for parameter in find_effect(identifier).parameters:
         if parameter.name == rest.partition("[")[0]:
             return parameter.lower, parameter.upper, parameter.typical

@@ -8,21 +8,20 @@ import numpy as np
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.campaign.contacts import noise_of
+from impactcell.campaign.contents import CHANNELS
 from impactcell.errors import CampaignError
 from impactcell.quality.channel_faults import channel_faults
 from impactcell.quality.data_fault import DataFault, Fault
 from impactcell.quality.motion_faults import LATE_STEPS, lateness_s, slides
 from impactcell.records import Capture, Samples
 
-CHANNELS = ("force", "position", "actuator")
 DRIFT_SHARE = 0.01
 """Change of the force at rest over a campaign, as a share of its largest force, from which on it is told."""
 DRIFT_STD = 6.0
 """The same in standard deviations of the scatter about its trend."""
 LOW_SHARE, REST_STD, MIN_REST_SHARE = 0.05, 5.0, 0.2
 """The force at rest is the median of what is within so many standard deviations of its lowest twentieth, if
-that
-is a fifth of the record at least: else it has hardly been recorded."""
+that is a fifth of the record at least: else it has hardly been recorded."""
 MIN_SHOTS = 6
 """Shots over which a drift or a lateness can be told."""
 UNUSABLE = (Fault.NO_MOTION, Fault.PRESLIDING_ONLY, Fault.CONSTANT)

@@ -14,11 +14,8 @@ from impactcell.discrepancy.machine import CATALOGUE, LAW_PLACES, LawForm, Numbe
 from impactcell.discrepancy.machine import BaseModel as MachineModel
 from impactcell.errors import SettingsError
 from impactcell.process import yaml_loader
+from impactcell.settings.fields import NotNegative, Positive
 
-Positive = Annotated[FiniteFloat, Field(gt=0)]
-"""A finite number above 0."""
-NotNegative = Annotated[FiniteFloat, Field(ge=0)]
-"""A finite number of at least 0."""
 NUISANCES = ("position_offset", "position_eccentricity", "force_offset", "force_gain", "delay_s")
 """What a measurement may be off by, in the order in which it is written."""
 HEADER = "# A base model of impactcell: a machine with one coordinate, for `impactcell discrepancy --base`.\n"

@@ -16,11 +16,8 @@ from impactcell.physics.outside_effects import offer_effects, offer_installed, s
 from impactcell.prediction.model import DistanceForm, ForceForm, Model, Predictor, Prior, Sensitivity
 from impactcell.process import yaml_loader
 from impactcell.process.whole_files import write_whole
+from impactcell.settings.fields import NotNegative, Positive
 
-Positive = Annotated[FiniteFloat, Field(gt=0)]
-"""A finite number above 0."""
-NotNegative = Annotated[FiniteFloat, Field(ge=0)]
-"""A finite number of at least 0."""
 Interval = tuple[FiniteFloat, FiniteFloat]
 """Lower and upper end."""
 

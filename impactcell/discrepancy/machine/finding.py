@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from impactcell.discrepancy.data import MIN_HELD_OUT, MIN_TRAINING
 from impactcell.discrepancy.laws import FittedFunction
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
 from impactcell.discrepancy.machine.regression import Blocks, LinearFit
@@ -10,19 +11,13 @@ from impactcell.discrepancy.machine.selection import SelectionStep
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord
 from impactcell.discrepancy.machine.weak_form import Column
-from impactcell.discrepancy.search import Proposal
+from impactcell.discrepancy.search import MAX_EXPECTED_GAP, MAX_P_VALUE, MIN_CLOSED_SHARE, Proposal
 from impactcell.german.open_loop import POOR_FIT_PERCENT
 
-MIN_TRAINING, MIN_HELD_OUT = 9, 5
-"""Blocks to fit and blocks held out that any test needs, as in the workflow of shots [1]."""
-MAX_EXPECTED_GAP = 1.3
-"""Gap beyond which no scatter between blocks excuses a model, as in the workflow of shots [1]."""
 LEAST_GAP = 0.5
 """Gap below which the noise is less than half of what it was taken for [1]."""
 FAR_ABOVE_NOISE = 2.0
 """Error of a simulated position over the sensor's noise from which on it is no noise [1]."""
-MAX_P, MIN_CLOSED = 0.1, 0.02
-"""Held-out test of a term beside an interval above 0, as in the workflow of shots [1]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +42,7 @@ class FallOfGap:
     @property
     def is_real(self) -> bool:
         """Whether held-out blocks confirm it."""
-        return self.low > 0.0 and self.closed >= MIN_CLOSED and self.p_value <= MAX_P
+        return self.low > 0.0 and self.closed >= MIN_CLOSED_SHARE and self.p_value <= MAX_P_VALUE
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from dataclasses import replace
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.laws import RankedForm, rank_forms
 from impactcell.discrepancy.machine.base_model import LawForm, TermChoice
-from impactcell.discrepancy.machine.finding import MAX_EXPECTED_GAP, FittedModel, MachineFinding, MachineLaw
+from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, MachineLaw
 from impactcell.discrepancy.machine.free_splines import best_spline, spline_function, tangent_of, with_spline
 from impactcell.discrepancy.machine.law_terms import LAW_PREFIX, term_of
 from impactcell.discrepancy.machine.machine_fits import MachineFits
@@ -29,6 +29,7 @@ from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.ties import TIE_Z
 from impactcell.discrepancy.machine.trials import ChosenTerm, mean_over_error
 from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, Column
+from impactcell.discrepancy.search import MAX_EXPECTED_GAP
 from impactcell.records import Samples
 
 MIN_SHARE = 0.05

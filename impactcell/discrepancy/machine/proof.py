@@ -5,22 +5,23 @@ import math
 import numpy as np
 from scipy.stats import t as student
 
-from impactcell.discrepancy.machine.finding import MAX_EXPECTED_GAP, FallOfGap, FittedModel
+from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel
 from impactcell.discrepancy.machine.regression import Blocks
+from impactcell.discrepancy.search import MAX_EXPECTED_GAP, MIN_OPEN_GAP
 from impactcell.records import Samples
 
 CLOSED_RESAMPLES = 999
 """Draws of the held-out blocks for the interval of the share that is closed [1]."""
-MIN_OPEN_GAP = 1.05
-"""Gap above which there is something to close, as in the workflow of shots [1]."""
+SIGN_DRAWS = 1999
+"""Draws of the signs of the blocks: the least p-value is a two-thousandth."""
 
 
-def sign_flip_p(differences: Samples, seed: int, draws: int = 1999) -> float:
+def sign_flip_p(differences: Samples, seed: int) -> float:
     """One-sided p-value that the sum of differences is above zero, signs of the blocks drawn at random."""
     rng = np.random.default_rng([seed, 8])
-    signs = 2.0 * rng.integers(0, 2, (draws, len(differences))) - 1.0
+    signs = 2.0 * rng.integers(0, 2, (SIGN_DRAWS, len(differences))) - 1.0
     least = differences.sum() - 1e-12 * np.abs(differences).sum()
-    return float(1 + np.sum(signs @ differences >= least)) / (1 + draws)
+    return float(1 + np.sum(signs @ differences >= least)) / (1 + SIGN_DRAWS)
 
 
 def gap(blocks: Blocks, model: FittedModel) -> float:

@@ -11,9 +11,10 @@ from itertools import combinations
 
 from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS, PLACES
-from impactcell.discrepancy.machine.ties import MAX_FLOOR, is_tied, tied_terms
+from impactcell.discrepancy.machine.ties import is_tied, tied_terms
 from impactcell.discrepancy.machine.trials import TermSearch, Trial, mean_over_error
 from impactcell.discrepancy.machine.weak_form import Column
+from impactcell.discrepancy.search import MAX_EXPECTED_GAP
 from impactcell.records import Samples
 
 MIN_GAIN_Z = 3.0
@@ -94,7 +95,7 @@ def select_terms(search: TermSearch, columns: Sequence[Column]) -> list[Selectio
 
 def _is_second(search: TermSearch, columns: Sequence[Column], trial: Trial) -> bool:
     """Whether a second term takes a gap of its own to the floor, and is no patch on a small remainder."""
-    is_closed = search.gap([*columns, *trial.term.columns]) <= MAX_FLOOR
+    is_closed = search.gap([*columns, *trial.term.columns]) <= MAX_EXPECTED_GAP
     return is_closed and search.gap(columns) >= MIN_SECOND_GAP
 
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from impactcell.discrepancy.machine.trials import TermSearch, Trial, mean_over_error
 from impactcell.discrepancy.machine.weak_form import Column
+from impactcell.discrepancy.search import MAX_EXPECTED_GAP
 from impactcell.records import Samples
 
 TIE_Z = 2.2
@@ -12,8 +13,6 @@ MIN_TIED_SHARE = 0.8
 """Share of the best term's gain below which another one is not tied whatever the scatter [1]."""
 EQUAL_SHARE = 0.97
 """Share of the best term's gain from which on another one is tied whatever the scatter [1]."""
-MAX_FLOOR = 1.3
-"""Gap in noise floors up to which a model leaves nothing, as in the workflow of shots [1]."""
 TOLD_GAP = 2.0
 """Noise floors from which on a term that leaves as much is no equal of one that leaves nothing [1]."""
 
@@ -24,7 +23,7 @@ def tied_terms(search: TermSearch, before: Samples, best: Trial, others: Sequenc
     Where the best one takes the gap to its floor, none is that leaves one, however small a share it is.
     """
     alike = [trial for trial in others if is_tied(best, trial)]
-    if search.gap_of(before - best.gains) <= MAX_FLOOR:
+    if search.gap_of(before - best.gains) <= MAX_EXPECTED_GAP:
         alike = [trial for trial in alike if search.gap_of(before - trial.gains) <= TOLD_GAP]
     return tuple(trial.term.choice.name for trial in alike)
 

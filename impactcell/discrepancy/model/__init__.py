@@ -22,7 +22,6 @@ from impactcell.discrepancy.model.linearisation import (
     unmet_gradient,
 )
 from impactcell.discrepancy.model.parameters import (
-    NOMINAL_PARAMETERS,
     Coordinate,
     effect_coordinates,
     parameter_name,
@@ -33,7 +32,6 @@ from impactcell.discrepancy.model.shot_fits import normal_equations
 from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
 
 __all__ = [
-    "NOMINAL_PARAMETERS",
     "Constraints",
     "Coordinate",
     "DirectionProducts",

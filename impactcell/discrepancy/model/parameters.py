@@ -14,7 +14,6 @@ from impactcell.physics import Effect, Parameter, ParameterKind
 from impactcell.physics.effects import find_effect
 from impactcell.records import Samples
 
-NOMINAL_PARAMETERS = ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k")
 MIN_RATIO, MAX_RATIO = 1.0, 5.0
 """Range of mu_s / mu_k: stiction is never below kinetic friction, and five times it is unheard of."""
 DAMPING_SCALE = 100.0

@@ -43,7 +43,10 @@ from impactcell.discrepancy.search.policy import POLICY
 from impactcell.discrepancy.search.residual_map import ALL
 from impactcell.discrepancy.search.unexplained_gap import UnexplainedGap, describe_gap
 from impactcell.discrepancy.search.validation import (
+    MAX_EXPECTED_GAP,
     MAX_P_VALUE,
+    MIN_CLOSED_SHARE,
+    MIN_OPEN_GAP,
     Gap,
     GapChange,
     GapMeasure,
@@ -54,7 +57,10 @@ from impactcell.discrepancy.search.validation import (
 __all__ = [
     "ALL",
     "ALPHA",
+    "MAX_EXPECTED_GAP",
     "MAX_P_VALUE",
+    "MIN_CLOSED_SHARE",
+    "MIN_OPEN_GAP",
     "NAMED",
     "NO_GAP",
     "POLICY",

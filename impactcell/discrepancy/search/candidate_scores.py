@@ -8,7 +8,6 @@ import numpy as np
 
 from impactcell.discrepancy.data import IndexArray
 from impactcell.discrepancy.model import (
-    NOMINAL_PARAMETERS,
     DirectionProducts,
     Fit,
     LinearisedFit,
@@ -23,6 +22,7 @@ from impactcell.discrepancy.model import (
 )
 from impactcell.discrepancy.search.effect_grid import SMALL_STRENGTH, GridPoint, VisitedRange, effect_grid
 from impactcell.errors import PhysicsError
+from impactcell.physics import NOMINAL_PARAMETERS
 from impactcell.physics.effect import Covariates, ParameterKind
 from impactcell.physics.effects import LIBRARY
 from impactcell.physics.law_table import build_law_table
