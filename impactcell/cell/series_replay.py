@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +19,14 @@ from impactcell.tracking.wear_batch import (
     TrackingResult,
     initial_state,
 )
+
+LARGEST_CYCLE = 2**53
+"""Beyond it doubles are no longer every whole number."""
+MOST_FALLS = 0.25
+"""Share of cycles with a lower number than the one before, above which a series is not in order: late cycles
+and counters that begin anew are few."""
+FEWEST_FALLS = 3
+"""Falls below which it says nothing of order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +90,14 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
     Raises
     ------
     SeriesError
-        The series has no cycles.
+        The series has no cycles, or they are not in the order in which they were measured.
     """
+    cycles = [observation.cycle for observation in observations]
+    falls = sum(after < before for before, after in pairwise(cycles))
+    if falls >= FEWEST_FALLS and falls > MOST_FALLS * len(cycles):
+        raise SeriesError(
+            f"{falls} of {len(cycles)} cycles have a lower number than the one before; sort them by cycle"
+        )
     rules = AlarmSettings()
     state, alarm_set = initial_state(), alarms.initial_state(rules)
     raised: list[RaisedAlarm] = []
@@ -141,6 +156,15 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
         used=used,
         notes=tuple(notes),
     )
+
+
+def whole_number_fault(cycle: float) -> str:
+    """Say why a number is none of a cycle; empty where it is one."""
+    if not (cycle >= 0.0 and cycle == math.floor(cycle) < math.inf):
+        return "is not a whole number from 0 on"
+    if cycle > LARGEST_CYCLE:
+        return f"is larger than {LARGEST_CYCLE}, up to which cycles are counted"
+    return ""
 
 
 def _refined(raised: RaisedAlarm, batch: BatchState) -> RaisedAlarm:

@@ -1,17 +1,22 @@
 """`impactcell track`: replay a friction series through the tracker and its alarms."""
 
-import csv
 import json
 import math
+import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Final
 
 from impactcell.cell.series_replay import TrackedSeries, replay
+from impactcell.cli.series_file import COLUMNS, SeriesFile, read_series
 from impactcell.errors import SeriesError
+from impactcell.process.console import print_note
 from impactcell.records.uncertainty import plus_minus
-from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings
+from impactcell.tracking.wear_batch import BatchKnowledge, TrackerSettings
 
-COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch")
+FIGURES: Final = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+"""Numbers in a note."""
 FEWEST_CYCLES = 2
 """Cycles that a rate of change takes."""
 
@@ -31,98 +36,41 @@ def track(
     Raises
     ------
     SeriesError
-        A file that cannot be read, with file and line.
+        A file that cannot be read, with file and line; cycles that are not in their order; a limit that is
+        no friction.
     """
-    readings, has_batch = read_series(series)
+    file = read_series(series)
     if batch not in (None, "known", "unknown"):
         raise SeriesError(f"--batch {batch}: say known or unknown")
     knowledge = BatchKnowledge(batch) if batch else None
-    if knowledge is BatchKnowledge.KNOWN and not has_batch:
+    if knowledge is BatchKnowledge.KNOWN and not file.has_batch:
         raise SeriesError(
             f"{series}:1: --batch known needs a column `batch`; leave the option out, or add it"
         )
     if knowledge is None:
-        knowledge = BatchKnowledge.KNOWN if has_batch else BatchKnowledge.UNKNOWN
+        knowledge = BatchKnowledge.KNOWN if file.has_batch else BatchKnowledge.UNKNOWN
+    if limit is not None and not 0.0 < limit < math.inf:
+        raise SeriesError(f"--limit {limit:g}: say the mu_s at which the surface is worn, 0.25 say")
     settings = TrackerSettings(wear_limit=math.inf if limit is None else limit, batch=knowledge)
-    tracked = replay(settings, readings)
+    try:
+        tracked = replay(settings, file.observations)
+    except SeriesError as error:
+        raise SeriesError(f"{series}: {error}") from error
     if tracked.used < FEWEST_CYCLES:
         why = f"; {tracked.notes[0][1]}" if tracked.notes else ""
         raise SeriesError(
-            f"{series}: only {tracked.used} of {len(readings)} cycles can be used, "
+            f"{series}: only {tracked.used} of {len(file.observations)} cycles can be used, "
             f"it takes {FEWEST_CYCLES}{why}"
         )
+    if file.unread:
+        print_note(_unread(series, file))
     text = json.dumps(_as_json(tracked)) if as_json else _as_text(tracked)
     sys.stdout.write(text + "\n")
 
 
-def read_series(path: Path) -> tuple[list[FrictionObservation], bool]:
-    """Read a series; also tell whether it has a column `batch`.
-
-    Raises
-    ------
-    SeriesError
-        No such file, no header, a column missing or twice, a cell that is no number.
-    """
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = list(csv.reader(file))
-    except OSError as error:
-        raise SeriesError(f"{path}: cannot be read: {error.strerror}") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise SeriesError(f"{path}: not a CSV file: {error}") from error
-    if not rows:
-        raise SeriesError(f"{path}:1: empty; the first line is to be cycle,mu_s,mu_s_std[,batch]")
-    header = [name.strip() for name in rows[0]]
-    if len(header) == 1 and ";" in header[0]:
-        raise SeriesError(f"{path}:1: is separated by `;`; write it with `,` and decimal points")
-    for name in ("cycle", "mu_s"):
-        if name not in header:
-            raise SeriesError(
-                f"{path}:1: no column `{name}`; the first line is to be cycle,mu_s,mu_s_std[,batch]"
-            )
-    for name in COLUMNS:
-        if header.count(name) > 1:
-            raise SeriesError(f"{path}:1: column `{name}` is there {header.count(name)} times; keep one")
-    readings = []
-    for line, row in enumerate(rows[1:], start=2):
-        if not any(cell.strip() for cell in row):
-            continue
-        if len(row) != len(header):
-            raise SeriesError(f"{path}:{line}: {len(row)} cells, but the header has {len(header)}")
-        cells = dict(zip(header, (cell.strip() for cell in row), strict=True))
-        readings.append(_reading(path, line, cells))
-    if not readings:
-        raise SeriesError(f"{path}:2: no cycles after the header")
-    return readings, "batch" in header
-
-
-def _reading(path: Path, line: int, cells: dict[str, str]) -> FrictionObservation:
-    try:
-        number = float(cells["cycle"])
-        cycle = int(number)
-    except (ValueError, OverflowError):
-        raise SeriesError(f"{path}:{line}: cycle `{cells['cycle']}` is not a whole number") from None
-    if cycle != number or cycle < 0:
-        raise SeriesError(f"{path}:{line}: cycle `{cells['cycle']}` is not a whole number from 0 on")
-    mu_s, std = (_number(path, line, name, cells.get(name, "")) for name in ("mu_s", "mu_s_std"))
-    return FrictionObservation(cycle, mu_s, std, batch_id=cells.get("batch") or None)
-
-
-def _number(path: Path, line: int, name: str, cell: str) -> float:
-    """Read a number; an empty cell is a missing one."""
-    if not cell:
-        return math.nan
-    try:
-        number = float(cell)
-    except ValueError:
-        raise SeriesError(
-            f"{path}:{line}: {name} `{cell}` is not a number; leave it empty if missing"
-        ) from None
-    if name == "mu_s_std" and not math.isfinite(number):
-        raise SeriesError(
-            f"{path}:{line}: {name} `{cell}` is no standard deviation; leave it empty if it is not known"
-        )
-    return number
+def _unread(series: Path, file: SeriesFile) -> str:
+    names, known = ", ".join(f"`{name}`" for name in file.unread), ", ".join(COLUMNS)
+    return f"{series}: not read: {names}; what is read is called {known}"
 
 
 def _as_json(series: TrackedSeries) -> dict[str, object]:
@@ -183,5 +131,16 @@ def _as_text(series: TrackedSeries) -> str:
         lines.append(
             f"{r.alarm} at cycle {r.cycle}: {changed}{plus_minus(e.size, e.size_std, '+.5f', '.5f')}"
         )
-    lines.extend(f"cycle {cycle}: {note}" for cycle, note in series.notes)
-    return "\n".join(lines)
+    return "\n".join([*lines, *_note_lines(series.notes)])
+
+
+def _note_lines(notes: Sequence[tuple[int, str]]) -> list[str]:
+    """Give a line to each kind of note: those alike but for their figures are told once, with how many."""
+    alike: dict[str, list[tuple[int, str]]] = {}
+    for cycle, note in notes:
+        alike.setdefault(FIGURES.sub("", note), []).append((cycle, note))
+    lines = []
+    for (cycle, note), *others in alike.values():
+        more = f" (and {len(others)} more like this, the last at cycle {others[-1][0]})" if others else ""
+        lines.append(f"cycle {cycle}: {note}{more}")
+    return lines

@@ -112,7 +112,8 @@ def test_a_limit_that_is_not_reached_is_told_in_words(tmp_path, capsys):
     ("text", "message"),
     [
         ("", ":1: empty"),
-        ("cycle;mu_s\n1;0,2\n", ":1: is separated by `;`; write it with `,` and decimal points"),
+        ("\n\n", ":1: empty"),
+        ("Zyklus;Reibung\n1;0,2\n", ":1: no column `cycle`"),
         ("cycle,mu\n1,0.2\n", ":1: no column `mu_s`"),
         ("cycle,mu_s,mu_s\n1,0.2,0.2\n", ":1: column `mu_s` is there 2 times"),
         ("cycle,mu_s,mu_s_std\n", ":2: no cycles"),
@@ -120,7 +121,15 @@ def test_a_limit_that_is_not_reached_is_told_in_words(tmp_path, capsys):
         ("cycle,mu_s,mu_s_std\n1.5,0.2,0.1\n", ":2: cycle `1.5` is not a whole number"),
         ("cycle,mu_s,mu_s_std\nx,0.2,0.1\n", ":2: cycle `x` is not a whole number"),
         ("cycle,mu_s,mu_s_std\ninf,0.2,0.1\n", ":2: cycle `inf` is not a whole number"),
+        ("cycle,mu_s,mu_s_std\n-,0.2,0.1\n", ":2: cycle `-` is not a whole number"),
+        ("cycle,mu_s,mu_s_std\n1e300,0.2,0.1\n", ":2: cycle `1e300` is larger than"),
         ("cycle,mu_s,mu_s_std\n1,abc,0.1\n", ":2: mu_s `abc` is not a number"),
+        (
+            "cycle;mu_s;mu_s_std\n1;0,2;0,1\n2;0,2;0.002\n",
+            ":3: mu_s_std `0.002` is not a number with decimal",
+        ),
+        ('cycle,mu_s\n1,0.2\n"2,0.2\n3,0.2\n', ":3: its quotes do not fit"),
+        ('cycle,mu_s,batch\n1,0.2,"a\nb"\n2,x,c\n', ":4: mu_s `x` is not a number"),
         ("cycle,mu_s,mu_s_std\n1,0.2,0.1\n2,0.2,nan\n", ":3: mu_s_std `nan` is no standard deviation"),
         ("cycle,mu_s,mu_s_std\n1,0.2,inf\n", ":2: mu_s_std `inf` is no standard deviation"),
         (
@@ -136,6 +145,72 @@ def test_faults_of_a_file(tmp_path, text, message):
         track(path)
     assert str(error.value).startswith(str(path))
     assert message in str(error.value)
+
+
+def test_every_fault_of_a_file_is_told_at_once(tmp_path):
+    path = tmp_path / "s.csv"
+    path.write_text("cycle,mu_s,mu_s_std\n1,abc,xx\n2,0.2,0.002\nthree,0.2,0.002\n4,0.2\n" + "x,0.2,0\n" * 50)
+    with pytest.raises(SeriesError) as error:
+        track(path)
+    told = str(error.value).splitlines()
+    assert [line.removeprefix(f"{path}:").split(" ")[:2] for line in told[:4]] == [
+        ["2:", "mu_s"],
+        ["2:", "mu_s_std"],
+        ["4:", "cycle"],
+        ["5:", "2"],
+    ]
+    assert told[-1] == f"{path}: and 34 more faults"
+
+
+@pytest.mark.parametrize(
+    ("written", "encoding"),
+    [
+        (lambda text: text.replace(",", ";").replace(".", ","), "utf-8-sig"),
+        (lambda text: text.replace(",", ";").replace(".", ",").replace("\n", "\r\n"), "cp1252"),
+        (lambda text: text.replace(",", "\t"), "utf-16"),
+        (lambda text: "sep=;\n" + text.replace(",", ";"), "utf-8"),
+        (lambda text: "# a cell, last week\n" + text.replace("cycle,mu_s", "Cycle,MU_S"), "utf-8"),
+        (lambda text: text.replace(",", " , ").replace("\n", ",,\n"), "utf-8"),
+        (lambda text: text.replace("0.002000\n", "0.002000,,\n"), "utf-8"),
+    ],
+)
+def test_a_file_as_people_have_it_says_the_same(tmp_path, capsys, written, encoding):
+    path = write(tmp_path / "s.csv", truth(60, at=0))
+    expected = run(capsys, path)
+    path.write_bytes(written(path.read_text()).encode(encoding))
+    assert run(capsys, path) == expected
+
+
+def test_columns_that_are_not_read_are_told(tmp_path, capsys):
+    path = write(tmp_path / "s.csv", truth(60, at=0))
+    path.write_text(path.read_text().replace("mu_s_std", "mu_s_sd"))
+    track(path)
+    assert "not read: `mu_s_sd`; what is read is called cycle, mu_s, mu_s_std" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("order", [np.arange(99, -1, -1), np.random.default_rng(4).permutation(100)])
+def test_cycles_that_are_not_in_order_are_refused(tmp_path, order):
+    path = write(tmp_path / "s.csv", truth(100, at=0)[order], cycles=order)
+    with pytest.raises(SeriesError, match=r"s\.csv: .* sort them by cycle"):
+        track(path)
+
+
+def test_a_counter_that_begins_anew_and_a_late_cycle_are_in_order(tmp_path, capsys):
+    cycles = [*range(100, 140), 142, 141, *range(143, 150), *range(40)]
+    found = run(capsys, write(tmp_path / "s.csv", truth(len(cycles), at=0), cycles=cycles))
+    assert found["cycles"] == len(cycles)
+
+
+def test_notes_that_are_alike_are_one_line(tmp_path, capsys):
+    track(write(tmp_path / "s.csv", truth(60, at=0), std=0.0))
+    (line,) = [line for line in capsys.readouterr().out.splitlines() if "standard deviation" in line]
+    assert line.endswith("(and 59 more like this, the last at cycle 59)")
+
+
+@pytest.mark.parametrize("limit", [math.nan, math.inf, -1.0, 0.0])
+def test_a_limit_that_is_no_friction_is_refused(tmp_path, limit):
+    with pytest.raises(SeriesError, match="--limit"):
+        track(write(tmp_path / "s.csv", truth(60, at=0)), limit=limit)
 
 
 def test_other_faults(tmp_path):

@@ -1,0 +1,162 @@
+"""A friction series from a file as people have it: any separator and decimal mark, every fault at once."""
+
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from impactcell.cell.series_replay import whole_number_fault
+from impactcell.errors import MeasurementError, SeriesError
+from impactcell.measurements.dialect import Dialect, decode, detect, split_cells
+from impactcell.measurements.numbers import is_grouped, parse_number
+from impactcell.measurements.text_layout import is_comment
+from impactcell.tracking.wear_batch import FrictionObservation
+
+COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch")
+"""What is read; the first two have to be there."""
+FIRST_LINE = "cycle,mu_s,mu_s_std[,batch]"
+"""In words."""
+DELIMITERS = (",", ";", "\t", "|")
+"""What may separate cells; the header tells which."""
+SEPARATOR_LINE = "sep="
+"""Begin of the line with which Excel says what separates cells."""
+MOST_FAULTS = 20
+"""Faults told of one file."""
+INFINITE = frozenset(("inf", "infinity"))
+"""Numbers without sign that are no measurement: the tracker says so."""
+
+
+@dataclass(frozen=True, slots=True)
+class SeriesFile:
+    """What a file says.
+
+    Attributes
+    ----------
+    observations : tuple of FrictionObservation
+    has_batch : bool
+        There is a column `batch`.
+    unread : tuple of str
+        Names of columns that are none of `COLUMNS`.
+    """
+
+    observations: tuple[FrictionObservation, ...]
+    has_batch: bool
+    unread: tuple[str, ...]
+
+
+def read_series(path: Path) -> SeriesFile:
+    """Read a series.
+
+    Raises
+    ------
+    SeriesError
+        No such file, no header, a column missing or twice; every row of another length and every cell that
+        is no number, with its line.
+    """
+    lines = _lines(path)
+    head = next(
+        (at for at, line in enumerate(lines) if not is_comment(line) and not _is_separator(line)), None
+    )
+    if head is None:
+        raise SeriesError(f"{path}:1: empty; the first line is to be {FIRST_LINE}")
+    delimiter, header = _header(f"{path}:{head + 1}", lines[head])
+    _, decimal, _ = detect(lines[head + 1 :], Dialect(delimiter=delimiter))
+    readings, faults = [], []
+    for line, row in _rows(path, lines, head + 1, delimiter):
+        cells, found = _cells(header, row)
+        if not found:
+            reading, found = _reading(cells, decimal)
+            readings.append(reading)
+        faults += [f"{path}:{line}: {fault}" for fault in found]
+    if faults:
+        rest = len(faults) - MOST_FAULTS
+        more = [f"{path}: and {rest} more faults"] if rest > 0 else []
+        raise SeriesError("\n".join([*faults[:MOST_FAULTS], *more]))
+    if not readings:
+        raise SeriesError(f"{path}:{head + 2}: no cycles after the header")
+    unread = tuple(name for name in header if name and name not in COLUMNS)
+    return SeriesFile(tuple(readings), "batch" in header, unread)
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        text, _ = decode(path.read_bytes(), str(path), None)
+    except OSError as error:
+        raise SeriesError(f"{path}: cannot be read: {error.strerror}") from error
+    except MeasurementError as error:
+        raise SeriesError(
+            f"{path}: not a CSV file; save the series as text whose first line is {FIRST_LINE}"
+        ) from error
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def _is_separator(line: str) -> bool:
+    return line.strip().strip('"').lower().startswith(SEPARATOR_LINE)
+
+
+def _header(place: str, line: str) -> tuple[str, list[str]]:
+    """Give the separator and the names of the columns."""
+    splits = []
+    for delimiter in DELIMITERS:
+        names = split_cells(line, delimiter)
+        splits.append((delimiter, [name.lower() if name.lower() in COLUMNS else name for name in names]))
+    delimiter, header = max(splits, key=lambda split: len(set(COLUMNS) & set(split[1])))
+    for name in COLUMNS[:2]:
+        if name not in header:
+            raise SeriesError(f"{place}: no column `{name}`; the first line is to be {FIRST_LINE}")
+    for name in COLUMNS:
+        if header.count(name) > 1:
+            raise SeriesError(f"{place}: column `{name}` is there {header.count(name)} times; keep one")
+    return delimiter, header
+
+
+def _rows(path: Path, lines: Sequence[str], first: int, delimiter: str) -> Iterator[tuple[int, list[str]]]:
+    """Give rows that are not blank, each with the line at which it begins."""
+    reader = csv.reader((f"{line}\n" for line in lines[first:]), delimiter=delimiter, strict=True)
+    while True:
+        line = first + reader.line_num + 1
+        try:
+            row = next(reader)
+        except StopIteration:
+            return
+        except csv.Error as error:
+            raise SeriesError(
+                f"{path}:{line}: its quotes do not fit ({error}); correct or remove them"
+            ) from error
+        cells = [cell.strip() for cell in row]
+        if any(cells):
+            yield line, cells
+
+
+def _cells(header: Sequence[str], row: list[str]) -> tuple[dict[str, str], list[str]]:
+    """Give the cells by name, and what is wrong with their number; empty ones beyond the header are none."""
+    if len(row) < len(header) or any(row[len(header) :]):
+        return {}, [f"{len(row)} cells, but the header has {len(header)}"]
+    return dict(zip(header, row, strict=False)), []
+
+
+def _reading(cells: dict[str, str], decimal: str) -> tuple[FrictionObservation, list[str]]:
+    faults = []
+    number = parse_number(cells["cycle"], decimal)
+    fault = "is not a whole number from 0 on" if number is None else whole_number_fault(number)
+    if number is None or fault:
+        faults.append(f"cycle `{cells['cycle']}` {fault}")
+        number = 0.0
+    mu_s, fault_of_mu_s = _number("mu_s", cells["mu_s"], decimal)
+    std, fault_of_std = _number("mu_s_std", cells.get("mu_s_std", ""), decimal)
+    faults += [fault for fault in (fault_of_mu_s, fault_of_std) if fault]
+    return FrictionObservation(int(number), mu_s, std, batch_id=cells.get("batch") or None), faults
+
+
+def _number(name: str, cell: str, decimal: str) -> tuple[float, str]:
+    """Give a number, and what is wrong with it; an empty cell is a missing one."""
+    if not cell:
+        return math.nan, ""
+    value = math.inf if cell.lower().lstrip("+-") in INFINITE else parse_number(cell, decimal)
+    if value is None or is_grouped(cell, decimal):
+        mark = "point" if decimal == "." else "comma"
+        return math.nan, f"{name} `{cell}` is not a number with decimal {mark}; leave it empty if missing"
+    if name == "mu_s_std" and not math.isfinite(value):
+        return value, f"{name} `{cell}` is no standard deviation; leave it empty if it is not known"
+    return value, ""
