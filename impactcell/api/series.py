@@ -6,8 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from impactcell.cell.series_replay import TrackedSeries, replay
+from impactcell.cell.series_replay import TrackedSeries, replay, whole_number_fault
 from impactcell.errors import SeriesError
+from impactcell.records import Samples
 from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings
 
 
@@ -16,7 +17,7 @@ def track(
     mu_s: ArrayLike,
     mu_s_std: ArrayLike | None = None,
     *,
-    batch: Sequence[str | None] | None = None,
+    batch: Sequence[object] | None = None,
     limit: float = math.inf,
 ) -> TrackedSeries:
     """Track wear and batch over a series of friction estimates, and raise what alarms there are.
@@ -24,12 +25,14 @@ def track(
     Parameters
     ----------
     cycle : array_like, shape (n,)
-        Whole numbers from 0 on, ascending.
+        Whole numbers from 0 on, in the order in which they were measured; a few may come late, twice, or
+        begin anew.
     mu_s, mu_s_std : array_like, shape (n,)
-        Estimates and their standard deviations; nan, or no standard deviations at all, where they are not
-        known.
+        Estimates and their standard deviations, one number for all or one each; nan, masked, or no standard
+        deviations at all, where they are not known.
     batch : sequence of str or None, optional
-        Batch of each cycle, where it is known; without it changes of batch are found in the series.
+        Batch of each cycle, where it is known (None, nan or empty where not); without it changes of batch
+        are found in the series.
     limit : float
         mu_s at which the surface is worn.
 
@@ -40,7 +43,8 @@ def track(
     Raises
     ------
     SeriesError
-        Series of different lengths, or without cycles; a cycle that is not a whole number from 0 on.
+        Series of different lengths, without cycles, or not in order; what is no number; a cycle that is not
+        a whole number from 0 on; a limit that is not above 0.
 
     Examples
     --------
@@ -51,19 +55,35 @@ def track(
     >>> [(alarm.alarm, alarm.evidence.change_cycle) for alarm in series.alarms]
     [('BatchShift', 250)]
     """
-    cycles, values = np.atleast_1d(np.asarray(cycle, np.float64)), np.atleast_1d(np.asarray(mu_s, np.float64))
-    stds = np.full(values.shape, math.nan) if mu_s_std is None else np.asarray(mu_s_std, np.float64)
-    sizes = [cycles.shape, values.shape, stds.shape, cycles.shape if batch is None else (len(batch),)]
+    cycles, values = _numbers("cycle", cycle), _numbers("mu_s", mu_s)
+    stds = _numbers("mu_s_std", math.nan if mu_s_std is None else mu_s_std)
+    if mu_s_std is None or np.ndim(mu_s_std) == 0:
+        stds = np.broadcast_to(stds, values.shape)
+    batches = [None] * len(cycles) if batch is None else [_batch_id(name) for name in batch]
+    sizes = [cycles.shape, values.shape, stds.shape, (len(batches),)]
     if len(set(sizes)) != 1 or cycles.ndim != 1:
         raise SeriesError(f"cycle, mu_s, mu_s_std and batch must be of one length, not of shapes {sizes}")
-    wrong = np.flatnonzero(~((cycles >= 0.0) & (cycles == np.floor(cycles)) & np.isfinite(cycles)))
-    if wrong.size:
-        raise SeriesError(f"cycle[{wrong[0]}] = {cycles[wrong[0]]:g} is not a whole number from 0 on")
+    for place, number in enumerate(cycles):
+        if fault := whole_number_fault(number):
+            raise SeriesError(f"cycle[{place}] = {number:g} {fault}")
+    if not limit > 0.0:
+        raise SeriesError(f"limit = {limit:g}: give the mu_s at which the surface is worn, or leave it out")
     observations = [
         FrictionObservation(int(at), float(value), float(std), batch_id=batch_id)
-        for at, value, std, batch_id in zip(
-            cycles, values, stds, [None] * len(cycles) if batch is None else batch, strict=True
-        )
+        for at, value, std, batch_id in zip(cycles, values, stds, batches, strict=True)
     ]
     knowledge = BatchKnowledge.UNKNOWN if batch is None else BatchKnowledge.KNOWN
     return replay(TrackerSettings(wear_limit=limit, batch=knowledge), observations)
+
+
+def _numbers(name: str, given: ArrayLike) -> Samples:
+    """Give an array of numbers; what a masked one hides is nan."""
+    try:
+        return np.atleast_1d(np.ma.filled(np.ma.asarray(given, np.float64), math.nan))
+    except (TypeError, ValueError) as error:
+        raise SeriesError(f"{name} is to hold numbers: {error}") from error
+
+
+def _batch_id(given: object) -> str | None:
+    """Give the name of a batch; None, an empty one and nan, as tables have it, say that there is none."""
+    return None if given is None or given == "" or given != given else str(given)

@@ -54,6 +54,9 @@ def test_standard_deviations_may_be_left_out() -> None:
         ([0.5, 2], [0.2, 0.2], [0.1, 0.1], r"cycle\[0\] = 0.5"),
         ([1, math.nan], [0.2, 0.2], [0.1, 0.1], r"cycle\[1\] = nan"),
         ([-1, 2], [0.2, 0.2], [0.1, 0.1], r"cycle\[0\] = -1"),
+        ([1, 1e300], [0.2, 0.2], [0.1, 0.1], r"cycle\[1\] = 1e\+300 is larger"),
+        ([1, 2], ["a", 0.2], [0.1, 0.1], "mu_s is to hold numbers"),
+        ([4, 3, 2, 1], [0.2] * 4, [0.1] * 4, "sort them by cycle"),
     ],
 )
 def test_what_is_no_series_is_refused(
@@ -61,3 +64,34 @@ def test_what_is_no_series_is_refused(
 ) -> None:
     with pytest.raises(SeriesError, match=message):
         impactcell.track(cycle, mu_s, std)
+
+
+@pytest.mark.parametrize("limit", [math.nan, 0.0, -math.inf])
+def test_a_limit_that_is_no_friction_is_refused(limit: float) -> None:
+    with pytest.raises(SeriesError, match="limit"):
+        impactcell.track([1, 2], [0.2, 0.2], limit=limit)
+
+
+def test_one_standard_deviation_stands_for_all() -> None:
+    one = impactcell.track(np.arange(100), series(count=100), 0.002)
+    each = impactcell.track(np.arange(100), series(count=100), np.full(100, 0.002))
+    assert (one.wear.level, one.wear.level_std) == (each.wear.level, each.wear.level_std)
+
+
+def test_what_a_masked_array_hides_is_missing() -> None:
+    hidden = np.arange(100) % 5 == 0
+    masked = impactcell.track(np.arange(100), np.ma.masked_array(series(count=100), hidden), 0.002)
+    missing = impactcell.track(np.arange(100), np.where(hidden, math.nan, series(count=100)), 0.002)
+    assert masked.used == 80
+    assert masked.wear.level == missing.wear.level
+
+
+def test_batches_that_a_table_leaves_out_are_none() -> None:
+    def tracked(*names: object) -> impactcell.TrackedSeries:
+        batch = [name for name in names for _ in range(50)]
+        return impactcell.track(np.arange(100), series(count=100), 0.002, batch=batch)
+
+    for absent in (math.nan, ""):
+        assert tracked(absent, absent).wear.level == tracked(None, None).wear.level
+        assert tracked("A", absent).wear.level == tracked("A", None).wear.level
+    assert tracked(1, 2).batch.batch_id == "2"
