@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from impactcell.cell.series_replay import TrackedSeries, replay
+from impactcell.alarms.rules import batch_shift, wear_limit
+from impactcell.cell.series_replay import RaisedAlarm, TrackedSeries, replay
 from impactcell.cli.series_file import COLUMNS, SeriesFile, read_series
 from impactcell.errors import SeriesError
 from impactcell.process.console import print_note
@@ -125,13 +126,18 @@ def _as_text(series: TrackedSeries) -> str:
             _cycles, (wear.cycles_to_limit, wear.cycles_to_limit_low, wear.cycles_to_limit_high)
         )
         lines.append(f"limit   {wear.limit:g}, cycles to it: {left}, 95 %: {low} .. {high}")
-    for r in series.alarms:
-        e = r.evidence
-        changed = f"changed at {e.change_cycle}, " if e.change_cycle else ""
-        lines.append(
-            f"{r.alarm} at cycle {r.cycle}: {changed}{plus_minus(e.size, e.size_std, '+.5f', '.5f')}"
-        )
+    lines.extend(map(_alarm_line, series.alarms))
     return "\n".join([*lines, *_note_lines(series.notes)])
+
+
+def _alarm_line(raised: RaisedAlarm) -> str:
+    evidence, begin = raised.evidence, f"{raised.alarm} at cycle {raised.cycle}: "
+    if raised.alarm == batch_shift.NAME:
+        size = plus_minus(evidence.size, evidence.size_std, "+.5f", ".5f")
+        return f"{begin}changed at {evidence.change_cycle}, {size}"
+    passed = f"passed at about {evidence.change_cycle}, " if raised.alarm == wear_limit.NAME else ""
+    off = plus_minus(abs(evidence.size), evidence.size_std, ".5f")
+    return f"{begin}{passed}level {off} {'above' if evidence.size > 0.0 else 'below'} the limit"
 
 
 def _note_lines(notes: Sequence[tuple[int, str]]) -> list[str]:

@@ -68,6 +68,16 @@ def test_the_wear_limit(tmp_path, capsys):
     assert 2000 <= worn["cycle"] < 2400
     assert abs(worn["change_cycle"] - 2000) < 250
     assert found["cycles_to_limit"] == 0.0
+    track(tmp_path / "s.csv", limit=0.21)
+    before, after = capsys.readouterr().out.splitlines()[-2:]
+    assert before == (
+        f"WearWarning at cycle {warned['cycle']}: "
+        f"level {-warned['size']:.5f} ± {2.0 * warned['size_std']:.5f} below the limit"
+    )
+    assert after == (
+        f"WearLimit at cycle {worn['cycle']}: passed at about {worn['change_cycle']}, "
+        f"level {worn['size']:.5f} ± {2.0 * worn['size_std']:.5f} above the limit"
+    )
 
 
 def test_missing_stds_missing_cycles_and_missing_values(tmp_path, capsys):
