@@ -81,7 +81,8 @@ def update_clock(
     seen = clock.seen[-reorder_limit:]
     if not is_new_session and 0 < lag <= reorder_limit:
         clock = replace(clock, seen=(*seen, index), session=session)
-        return clock, CycleTiming(index, 0, lag, repeated=False, note=f"cycle {cycle} came {lag} cycles late")
+        late = f"{lag} cycle{'s' if lag > 1 else ''} late"
+        return clock, CycleTiming(index, 0, lag, repeated=False, note=f"cycle {cycle} came {late}")
     has_restarted = is_new_session or lag > 0
     base = clock.last + 1 - cycle if has_restarted else clock.base
     index = cycle + base
@@ -99,11 +100,10 @@ def validate_estimate(value: float, std: float) -> tuple[str, bool]:
         return f"mu_s is {'missing' if math.isnan(value) else 'infinite'}, the cycle is not used", True
     if not 0.0 <= value <= LARGEST_FRICTION:
         return f"mu_s = {value:g} is outside 0 .. {LARGEST_FRICTION:g}, the cycle is not used", True
-    if std == 0.0:
-        return "the standard deviation of mu_s is zero, the usual one is used", False
-    if std < 0.0 or std > LARGEST_FRICTION:
-        return f"the standard deviation of mu_s is {std:g}, the usual one is used", False
-    return "", False
+    if math.isnan(std) or std == valid_std(std):
+        return "", False
+    said = f"{std:g}" if std else "zero"
+    return f"the standard deviation of mu_s is {said}, the usual one is used", False
 
 
 def valid_std(std: float) -> float:

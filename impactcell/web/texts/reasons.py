@@ -18,6 +18,27 @@ GERMAN: Final = {
     r"from the module's summary: (.+)": r"aus der Zusammenfassung des Moduls: \1",
     r"mu_s has been the same (\d+) times in a row, not used":
         r"µs war \1-mal hintereinander gleich, nicht verwendet",
+    r"mu_s is missing, the cycle is not used": "µs fehlt, der Zyklus wird nicht verwendet",
+    r"mu_s is infinite, the cycle is not used": "µs ist unendlich, der Zyklus wird nicht verwendet",
+    r"mu_s = (\S+) is outside (\S+) \.\. (\S+), the cycle is not used":
+        r"µs = \1 liegt außerhalb von \2 bis \3, der Zyklus wird nicht verwendet",
+    r"the standard deviation of mu_s is zero, the usual one is used":
+        "die Standardabweichung von µs ist null, die übliche wird verwendet",
+    r"the standard deviation of mu_s is (\S+), the usual one is used":
+        r"die Standardabweichung von µs ist \1, die übliche wird verwendet",
+    r"cycle (\d+) came twice, the second is ignored": r"Zyklus \1 kam zweimal, der zweite zählt nicht",
+    r"cycle (\d+) came 1 cycle late": r"Zyklus \1 kam einen Zyklus zu spät",
+    r"cycle (\d+) came (\d+) cycles late": r"Zyklus \1 kam \2 Zyklen zu spät",
+    r"cycle numbers restarted at (\d+)": r"die Zyklusnummern begannen neu bei \1",
+    r"the clock went back by (\S+) s": r"die Uhr ging um \1 s zurück",
+    r"friction is found to go steadily from cycle to cycle, the past is seen so from here on":
+        "die Reibung ändert sich, wie sich zeigt, von Zyklus zu Zyklus stetig; so wird die "
+        "Vergangenheit von nun an gesehen",
+    r"friction is found to go unsteadily from cycle to cycle, the past is seen so from here on":
+        "die Reibung ändert sich, wie sich zeigt, von Zyklus zu Zyklus unstetig; so wird die "
+        "Vergangenheit von nun an gesehen",
+    r"no change of batch is reported yet: the scale of the noise is still being learned":
+        "noch wird kein Chargenwechsel gemeldet: die Größe des Rauschens wird noch gelernt",
     r"the batch id changes too often to say anything of batches":
         "die Charge wechselt zu oft, um etwas über Chargen zu sagen",
     r"the reference is being learned, (\d+) more cycles":

@@ -1,6 +1,7 @@
 """Published reasons are said in German where the page speaks German."""
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,9 @@ import pytest
 
 from impactcell.measurements import guess, make_campaign, read_tables
 from impactcell.prediction.equations import beyond_calibration
+from impactcell.tracking.wear_batch import initial_state
+from impactcell.tracking.wear_batch.batch_change_detection import reason_not_ready
+from impactcell.tracking.wear_batch.input_validation import CycleClock, update_clock, validate_estimate
 from impactcell.web.cell_view import CellView
 from impactcell.web.interface import CellNews
 from impactcell.web.texts.import_notes import page_note
@@ -55,12 +59,31 @@ def test_what_lies_outside_the_calibration_is_said_in_german() -> None:
          "aus der Zusammenfassung des Moduls: Kraft wurde nicht aufgezeichnet"),
         ("residuals are 2.31 times the sensors' noise: the model lacks something",
          "die Abweichung ist 2,31-mal das Rauschen der Sensoren: dem Modell fehlt etwas"),
+        ("friction is found to go unsteadily from cycle to cycle, the past is seen so from here on",
+         ("die Reibung ändert sich, wie sich zeigt, von Zyklus zu Zyklus unstetig; so wird die "
+          "Vergangenheit von nun an gesehen")),
         ("what nobody has translated; in place", "what nobody has translated; am Ziel"),
         ("", ""),
     ],
 )  # fmt: skip
 def test_a_sentence(english: str, german: str) -> None:
     assert german_reason(english) == german
+
+
+def test_what_the_tracker_says_of_a_cycle_is_said_in_german() -> None:
+    """Every note of an estimate or a cycle number that is not as it should be, made by the tracker itself."""
+    values = [math.nan, math.inf, -0.1, 12.0]
+    notes = [validate_estimate(value, 0.002)[0] for value in values]
+    notes += [validate_estimate(0.2, std)[0] for std in (0.0, -0.002, 1e-12)]
+    clock = CycleClock()
+    for cycle in (100, 101, 104, 103, 102, 102, 3):
+        clock, timing = update_clock(clock, cycle, (1000 + cycle) * 10**9, 64)
+        notes += timing.note.split("; ") if timing.note else []
+    notes.append(reason_not_ready(initial_state()))
+    assert len(notes) == 13
+    for note in notes:
+        assert german_reason(note) != note
+        assert not words(german_reason(note)) & {*ENGLISH, "cycle", "cycles", "came", "used", "mu_s", "clock"}
 
 
 def test_a_card_has_both_languages() -> None:

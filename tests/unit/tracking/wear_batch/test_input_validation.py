@@ -3,7 +3,9 @@
 import math
 from dataclasses import replace
 
-from impactcell.tracking.wear_batch.input_validation import CycleClock, update_clock
+import pytest
+
+from impactcell.tracking.wear_batch.input_validation import CycleClock, update_clock, validate_estimate
 
 LIMIT = 64
 
@@ -84,3 +86,20 @@ def test_a_cycle_without_a_time_leaves_the_period_as_it_was():
     assert math.isnan(clock.period_s)
     clock, _ = update_clock(clock, 3, begin + second, LIMIT)
     assert clock.period_s == 1.0
+
+
+@pytest.mark.parametrize(
+    ("std", "said"), [(0.0, "zero"), (-0.002, "-0.002"), (1e-12, "1e-12"), (11.0, "11"), (math.inf, "inf")]
+)
+def test_a_standard_deviation_that_is_not_used_is_told(std, said):
+    note = f"the standard deviation of mu_s is {said}, the usual one is used"
+    assert validate_estimate(0.2, std) == (note, False)
+
+
+@pytest.mark.parametrize("std", [math.nan, 1e-9, 0.002, 10.0])
+def test_one_that_can_be_one_or_is_not_there_needs_no_note(std):
+    assert validate_estimate(0.2, std) == ("", False)
+
+
+def test_one_cycle_late_is_not_one_cycles_late():
+    assert come([10, 12, 11])[1][-1].note == "cycle 11 came 1 cycle late"
