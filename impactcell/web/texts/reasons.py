@@ -16,6 +16,10 @@ GERMAN: Final = {
         "µs über µk/µs des Modells: das Teil bewegte sich sofort",
     r"no (force|position) was recorded": r"\1 wurde nicht aufgezeichnet",
     r"from the module's summary: (.+)": r"aus der Zusammenfassung des Moduls: \1",
+    r"peak force says mu_s (\S+), sliding distance (\S+): mass, velocity, or the scale of one of them is "
+    r"wrong, or the model":
+        r"die Spitzenkraft sagt µs \1, der Gleitweg \2: Masse, Geschwindigkeit oder der Maßstab einer der "
+        r"beiden ist falsch, oder das Modell",
     r"mu_s has been the same (\d+) times in a row, not used":
         r"µs war \1-mal hintereinander gleich, nicht verwendet",
     r"mu_s is missing, the cycle is not used": "µs fehlt, der Zyklus wird nicht verwendet",

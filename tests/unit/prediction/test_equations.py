@@ -19,8 +19,10 @@ from impactcell.prediction.equations import (
     force_weight,
     out_of_range,
 )
+from impactcell.prediction.estimate import estimate
 from impactcell.prediction.mass_interpolation import interpolate_mass, sliding_distance
-from impactcell.records import Quality
+from impactcell.records import Capture, Quality, Summary
+from impactcell.web.texts.reasons import german_reason
 from tests.taps import VISCOUS, Tap
 
 PLANT = Plant(6.5e5, 465.0, 0.2, 0.152, effects=VISCOUS)
@@ -215,3 +217,39 @@ def test_calibration_is_deterministic_and_tells_its_progress() -> None:
 def test_a_part_that_never_slides_free_cannot_be_calibrated() -> None:
     with pytest.raises(PredictionError, match="slides free"):
         calibrate(PLANT, TapInput(0.1, 18.9, 1e-5), [18.9], np.linspace(0.01, 0.02, 5), FRICTIONS)
+
+
+def _by_figures(model: Model, tap: Tap, cycle: int, rng: np.random.Generator) -> Capture:
+    """What a module without samples says of a tap."""
+    moved = tap.motion()
+    peak, slid = moved.peak_force_n + rng.normal(0.0, 0.5), moved.sliding_distance_m + rng.normal(0.0, 5e-6)
+    figures = Summary(peak, slid, 0.5, 5e-6)
+    return Capture(cycle, tap.velocity_m_s, tap.mass_kg, None, None, stroke_m=tap.stroke_m, summary=figures)
+
+
+def test_figures_of_a_module_that_contradict_each_other_are_uncertain() -> None:
+    """A mass, a velocity or a scale that is wrong by 5 % bends mu_s by 6 to 30 %, and nothing else shows."""
+    stroke_m = 1.5e-3
+    tap = TapInput(0.1, 18.9, stroke_m)
+    masses = (18.9 * np.geomspace(0.8, 1.25, 5)).tolist()
+    model = Model(
+        "m", PLANT, PRIOR, calibrate(PLANT, tap, masses, np.linspace(0.05, 0.1, 9), FRICTIONS), stroke_m
+    )
+    rng = np.random.default_rng(5)
+    wrong = {"mass_kg": 1.05, "velocity_m_s": 1.05}
+    for cycle in range(1, 41):
+        ratio = 0.76 + 0.01 * rng.normal()
+        made = Tap(rng.uniform(0.08, 0.095), 0.2 * (1 + 0.02 * rng.normal()), ratio, stroke_m=stroke_m)
+        right = _by_figures(model, made, cycle, rng)
+        found = estimate(right, model).mu_s
+        assert (found.quality, found.reason) == (Quality.GOOD, "")
+        assert found.value == pytest.approx(made.mu_s, abs=4.0 * found.std)
+        figures = right.summary
+        assert figures is not None
+        captures = [replace(right, **{name: getattr(right, name) * factor}) for name, factor in wrong.items()]
+        captures.append(replace(right, summary=replace(figures, peak_force_n=0.95 * figures.peak_force_n)))
+        for capture in captures:
+            told = estimate(capture, model).combined
+            assert told.quality is not Quality.GOOD
+            assert "peak force" in told.reason
+    assert "die Spitzenkraft sagt" in german_reason(estimate(captures[0], model).mu_s.reason)
