@@ -15,11 +15,16 @@ from impactcell.alarms.rule import (
     german,
     percent_sure,
 )
-from impactcell.records import Evidence, WearState
+from impactcell.records import Evidence, Quality, WearState
 from impactcell.records.uncertainty import TOLD_STDS, plus_minus
 
 NAME = "WearLimit"
 """Published name."""
+DOUBT = (
+    "The friction that this follows is itself uncertain: see its reason first. ",
+    "Die Reibung, der dies folgt, ist selbst unsicher: zuerst deren Grund ansehen. ",
+)
+"""What is said before a surface is renewed for what a wrong scale or model may have made."""
 
 
 def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
@@ -45,14 +50,15 @@ def _passed(wear: WearState, cycle: int, above: float) -> int:
 def _message(wear: WearState, evidence: Evidence, cycle: int) -> Message:
     since, reach = evidence.change_cycle, TOLD_STDS * wear.level_std
     sure, sure_in_german = percent_sure(evidence.statistic)
+    doubt, doubt_in_german = DOUBT if wear.quality is Quality.UNCERTAIN else ("", "")
     first, last = (_passed(wear, cycle, evidence.size + edge) for edge in (reach, -reach))
     return Message(
         f"The surface is worn: friction is {plus_minus(wear.level, wear.level_std, '.4f')} (95 %), "
         f"its limit {wear.limit:.4f} was passed at about cycle {since} ({first} to {last}; "
-        f"{sure} % sure). Renew the surface, then reset wear.",
+        f"{sure} % sure). {doubt}Renew the surface, then reset wear.",
         f"Die Oberfläche ist verschlissen: Reibung {german(wear.level, '.4f', wear.level_std)} (95 %), "
         f"Grenze {german(wear.limit, '.4f')} etwa bei Zyklus {since} überschritten ({first} bis {last}; "
-        f"{sure_in_german} % sicher). Oberfläche erneuern, danach Verschleiß zurücksetzen.",
+        f"{sure_in_german} % sicher). {doubt_in_german}Oberfläche erneuern, danach Verschleiß zurücksetzen.",
     )
 
 

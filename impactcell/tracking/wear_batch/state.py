@@ -5,7 +5,15 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from impactcell.records import BatchState, Capture, Evidence, FrictionEstimate, Samples, WearState
+from impactcell.records import (
+    BatchState,
+    Capture,
+    Evidence,
+    FrictionEstimate,
+    Quality,
+    Samples,
+    WearState,
+)
 from impactcell.tracking.wear_batch.input_validation import CycleClock, CycleTiming
 from impactcell.tracking.wear_batch.noise_identification import CommissioningRecord
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale
@@ -25,6 +33,8 @@ class FrictionObservation:
         What the estimate is of changes with this cycle, and somebody said so: another batch, another model.
     session : int
         The module's; another one than before counts its cycles anew. 0 where it is not known.
+    doubt : str
+        Why mu_s is uncertain; empty where it is not.
     """
 
     cycle: int
@@ -34,6 +44,7 @@ class FrictionObservation:
     batch_id: str | None = None
     expected_change: bool = False
     session: int = 0
+    doubt: str = ""
 
     @classmethod
     def of(
@@ -41,7 +52,10 @@ class FrictionObservation:
     ) -> "FrictionObservation":
         """Take the published mu_s of the estimate from a capture."""
         mu_s = estimate.mu_s
-        return cls(capture.cycle, mu_s.value, mu_s.std, capture.time_ns, batch_id, expected, capture.session)
+        doubt = mu_s.reason if mu_s.quality is Quality.UNCERTAIN else ""
+        return cls(
+            capture.cycle, mu_s.value, mu_s.std, capture.time_ns, batch_id, expected, capture.session, doubt
+        )
 
 
 ANNOUNCED, UNSAID, RULED_OUT = 1.0, 0.0, -1.0

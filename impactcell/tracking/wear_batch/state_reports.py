@@ -60,7 +60,11 @@ def empty_result(
 def tracking_result(
     settings: TrackerSettings, state: TrackerState, observation: FrictionObservation, outcome: CycleOutcome
 ) -> TrackingResult:
-    """Report a cycle: by the filter where the batch is known, else by the bank."""
+    """Report a cycle: by the filter where the batch is known, else by the bank.
+
+    What makes mu_s uncertain, a wrong scale for one, shifts all estimates alike, which their scatter does not
+    show: the level is no better than the estimate that it follows.
+    """
     notes = outcome.notes
     probability = None
     quality = Quality.GOOD if outcome.used and not notes else Quality.UNCERTAIN
@@ -80,7 +84,15 @@ def tracking_result(
             if math.isfinite(settings.wear_limit):
                 probability = wear_blocks.probability_above(blocks, index, settings.wear_limit)
     walks = (state.level_variance, state.slope_variance)
-    wear = wear_report.forecast(moments, walks, settings.wear_limit, quality, "; ".join(notes), probability)
+    doubts = [*notes, *([observation.doubt] if observation.doubt else [])]
+    wear = wear_report.forecast(
+        moments,
+        walks,
+        settings.wear_limit,
+        Quality.UNCERTAIN if doubts else quality,
+        "; ".join(doubts),
+        probability,
+    )
     change = state.change_point
     not_ready = batch_change_detection.reason_not_ready(state)
     batch = BatchState(

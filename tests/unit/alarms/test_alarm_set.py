@@ -117,6 +117,13 @@ def test_a_message_is_never_sure_of_all(probability: float, english: str, german
     assert judge(SETTINGS, NORMAL, rising(1000.0, 1.0), WARNING).message.english.count("100 %") == 0
 
 
+def test_no_surface_is_to_be_renewed_for_uncertain_friction_alone():
+    for quality, is_doubted in ((Quality.GOOD, False), (Quality.UNCERTAIN, True)):
+        message = judge(SETTINGS, NORMAL, CycleInputs(1000, wear(0.99, quality)), WEAR).message
+        assert ("itself uncertain: see its reason first. Renew" in message.english) == is_doubted
+        assert ("selbst unsicher: zuerst deren Grund ansehen. Oberfläche" in message.german) == is_doubted
+
+
 def test_an_unknown_wear_leaves_the_alarm_alone():
     for unknown in (wear(math.nan), wear(0.99, Quality.BAD)):
         assert judge(SETTINGS, ACTIVE, CycleInputs(1, unknown), WEAR).holds is None
