@@ -71,14 +71,14 @@ def baseline_of(force: Samples, threshold_n: float | None = None) -> Baseline:
 
 
 def contact_onsets(time: Samples, force: Samples, baseline: Baseline) -> list[int]:
-    """Index of the first sample of each tap's first contact."""
+    """Index of the first sample of each tap's first contact; a spike is none, and hides none after it."""
     above = force - baseline.offset > baseline.threshold
     run = above.copy()
     for step in range(1, CONFIRMING_SAMPLES):
         run[:-step] &= above[step:]
     starts = np.flatnonzero(run & ~np.concatenate([[False], run[:-1]]))
     onsets: list[int] = []
-    touching = np.flatnonzero(above)
+    touching = np.flatnonzero(np.convolve(run, np.ones(CONFIRMING_SAMPLES))[: len(run)] > 0.0)
     for start in starts.tolist():
         earlier = touching[touching < start]
         is_new = not earlier.size or time[start] - time[earlier[-1]] > SHOT_GAP_S

@@ -49,7 +49,8 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
         taps += _taps(record, given, faults)
     raise_faults(faults)
     if len(taps) > len(records):
-        notes.append(f"{len(records)} records cut into {len(taps)} taps where the force begins anew")
+        told = "1 record" if len(records) == 1 else f"{len(records)} records"
+        notes.append(f"{told} cut into {len(taps)} taps where the force begins anew")
     starts = _contact_times(taps, notes)
     return [
         _capture(n, tap, t0, given) for n, (tap, t0) in enumerate(zip(taps, starts, strict=True), 1)

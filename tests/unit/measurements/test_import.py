@@ -83,12 +83,23 @@ def test_a_long_record_is_cut_into_its_taps(tmp_path: Path) -> None:
     imported = make_campaign(tables, guess(tables, given))
     shots = imported.campaign.shots
     assert [shot.direction for shot in shots] == [1, -1, 1, -1]
-    assert "1 records cut into 4 taps where the force begins anew" in imported.notes
+    assert "1 record cut into 4 taps where the force begins anew" in imported.notes
     for shot in shots:
         assert shot.position is not None
         assert shot.position.time_s[0] < -0.02
         assert shot.position.time_s[-1] < 0.4
         assert np.ptp(shot.position.values[-50:]) < 2e-5
+
+
+def test_a_spike_before_contact_hides_no_tap() -> None:
+    rng = np.random.default_rng(6)
+    time, force, position = sampled(taps((3000,), (18.9,))[0], rng)
+    force[50] += 12.0  # of one sample, 25 ms before contact
+    tables = [table(Time=("s", time), Force=("N", force), Position=("m", position))]
+    given = Given(constants={"mass": 18.9, "velocity": 0.05})
+    (shot,) = make_campaign(tables, guess(tables, given)).campaign.shots
+    assert shot.force is not None
+    assert shot.force.time_s[0] == pytest.approx(-0.03, abs=2e-4)
 
 
 def test_lines_beside_the_columns_are_told_and_a_count_of_rows_is_no_covariate(tmp_path: Path) -> None:
