@@ -22,7 +22,7 @@ from impactcell.measurements import (
     write_campaign,
 )
 from impactcell.measurements.given import read_given
-from impactcell.process.console import print_note, print_result
+from impactcell.process.console import is_quiet, print_note, print_result
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ def import_files(
     _check_distinct(files)
     tables = [table for file in files for table in read_tables(file, limits, options.dialect)]
     mapping = guess(tables, given)
-    if not as_json:
+    if not as_json and not is_quiet():
         _print_guess(tables, mapping)
     try:
         imported = (

@@ -217,6 +217,9 @@ def test_the_verb_shows_what_it_guessed_and_writes(
     assert [(c["column"], c["quantity"], c["unit"]) for c in said["columns"]] == [
         ("Zeit", "time", "ms"), ("Kraft", "force", "N"), ("Weg", "position", "µm"),
     ]  # fmt: skip
+    run("--quiet", "--out", str(tmp_path / "q"))
+    told = capsys.readouterr()
+    assert (told.out, told.err) == ("", "")
     run("--out", str(tmp_path / "c"), "--set", "mass=12.6kg", "--set", "stroke=1.5mm", "--sign", "force=-1")
     told = capsys.readouterr()
     assert f"{len(files)} shots of excitation tap, in {tmp_path / 'c'}" in told.out
