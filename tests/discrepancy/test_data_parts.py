@@ -1,6 +1,7 @@
 """Parts of the data by themselves: drives, blocks, columns and what is held out."""
 
 import math
+import re
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 from impactcell.discrepancy.data import driven_blocks, measured_drive, prepared_campaign
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.measured_drive import SmoothedDrive, position_response, smooth_drive
+from impactcell.discrepancy.data.noise_at_rest import correlated_noise
 from impactcell.discrepancy.data.noise_floor import sensor_noise
 from impactcell.errors import CampaignError
 
@@ -102,6 +104,31 @@ def test_a_channel_that_shows_no_noise_and_states_none_is_refused() -> None:
     )
     with pytest.raises(CampaignError, match="neither is its noise stated"):
         sensor_noise(prepared)
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.8])
+@pytest.mark.parametrize("stated", [None, 1.5e-6])
+def test_noise_at_rest_that_is_more_than_neighbours_show_is_told(
+    correlation: float, stated: float | None
+) -> None:
+    """First-order autoregressive noise of a standard deviation of 1.5 µm, 200 samples before contact."""
+    rng = np.random.default_rng(3)
+    recorded, counted = [], []
+    for shot in range(24):
+        values = rng.normal(0.0, 1.5e-6, 400)
+        for i in range(1, len(values)):
+            values[i] = correlation * values[i - 1] + math.sqrt(1.0 - correlation**2) * values[i]
+        values[60] += 1e-4 * (shot % 6 == 0)  # a spike in some shots
+        whole, kept = (SimpleNamespace(values=part, noise_std=stated) for part in (values, values[200:]))
+        recorded.append(SimpleNamespace(force=None, position=whole))
+        counted.append(SimpleNamespace(force=None, position=kept))
+    campaigns: Any = (SimpleNamespace(shots=recorded), SimpleNamespace(shots=counted))
+    notes = correlated_noise(*campaigns)
+    assert len(notes) == (correlation > 0.0 and stated is None)
+    for note in notes:
+        told = re.search(r"position scatters by (\S+) µm, .* State noise_std_m of sensors: position", note)
+        assert told
+        assert float(told[1]) == pytest.approx(1.5, rel=0.1)
 
 
 def test_a_quarter_of_every_setting_is_held_out() -> None:

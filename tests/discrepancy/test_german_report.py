@@ -186,6 +186,14 @@ def test_laws_of_a_machine_and_where_they_come_from_are_said_in_german() -> None
             ("de", ("Das Rauschen (Position) ist nicht angegeben; 1,5 µm ist aus benachbarten Messwerten "
                     "geschätzt, eine untere Schranke, wo es korreliert ist.")),
         ),
+        (
+            ("At rest before contact position scatters by 1.55 µm, 2.4 times what neighbouring samples "
+             "show: ... State noise_std_m of sensors: position in campaign.yaml, and run again."),
+            ("de", ("In Ruhe vor dem Kontakt streut ein Messwert um 1,55 µm (Position), das "
+                    "2,4-Fache dessen, was benachbarte zeigen: das Rauschen ist korreliert, und eine "
+                    "Abweichung dieser Größe kann die des Sensors sein. noise_std_m unter sensors: position "
+                    "in campaign.yaml angeben und neu rechnen.")),
+        ),
         ("Shot 7 has a gap in time; what happened in it is lost.",
          ("de", "Stoß 7 hat eine Lücke in der Zeit; was darin geschah, ist verloren.")),
         ("Data, clipped: shot 2: the force stands at its upper end, 5.2, for 12 samples.",

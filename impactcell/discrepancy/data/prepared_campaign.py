@@ -14,6 +14,7 @@ from impactcell.campaign import Campaign, Coordinate, Excitation, from_contact
 from impactcell.discrepancy.data.driven import Driven
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.free_slide import FreeSlide
+from impactcell.discrepancy.data.noise_at_rest import correlated_noise
 from impactcell.discrepancy.data.prepared_shots import (
     POSITION,
     IndexArray,
@@ -79,10 +80,11 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     """
     strategy = STRATEGIES[campaign.excitation]
     recorded = {shot.cycle: shot for shot in campaign.shots}
-    campaign, pretrigger = from_contact(campaign)
+    whole = campaign
+    campaign, pretrigger = from_contact(whole)
     data_faults = inspect_campaign(campaign)
     refuse_unusable(campaign, data_faults)
-    notes = [*pretrigger, *notes_of(data_faults)]
+    notes = [*pretrigger, *correlated_noise(whole, campaign), *notes_of(data_faults)]
     captures = strategy.cut(campaign, notes)
     if len(captures) < MIN_SHOTS:
         message = (

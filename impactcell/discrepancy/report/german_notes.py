@@ -71,6 +71,10 @@ NOTES: Final[Patterns] = (
     (r"The noise of (\w+) is not stated; (\S+(?: \S+)?) was estimated .*",
      lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus benachbarten Messwerten "
      "geschätzt, eine untere Schranke, wo es korreliert ist."),
+    (r"At rest before contact (\w+) scatters by (\S+ \S+), (\S+) times what .* State (\w+) of .*",
+     lambda m: f"In Ruhe vor dem Kontakt streut ein Messwert um {m[2]} ({phrase(m[1])}), das {m[3]}-Fache "
+     "dessen, was benachbarte zeigen: das Rauschen ist korreliert, und eine Abweichung dieser Größe kann "
+     f"die des Sensors sein. {m[4]} unter sensors: {m[1]} in campaign.yaml angeben und neu rechnen."),
     (r"The mass of shot (\d+) is not stated and is fitted, block by block\.",
      r"Die Masse zu Stoß \1 ist nicht angegeben und wird angepasst, Block für Block."),
     (r"(\d+) of (\d+) training blocks were left out: .*",
