@@ -14,6 +14,7 @@ from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.measured_drive import SmoothedDrive, position_response, smooth_drive
 from impactcell.discrepancy.data.noise_at_rest import correlated_noise
 from impactcell.discrepancy.data.noise_floor import sensor_noise
+from impactcell.discrepancy.data.unit_checks import PlausibleRatio, check_units
 from impactcell.errors import CampaignError
 
 
@@ -129,6 +130,24 @@ def test_noise_at_rest_that_is_more_than_neighbours_show_is_told(
         told = re.search(r"position scatters by (\S+) µm, .* State noise_std_m of sensors: position", note)
         assert told
         assert float(told[1]) == pytest.approx(1.5, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("value", "columns", "factor"),
+    [
+        (1520.0, "force_n or mass_kg", "1e+3"),
+        (2e-6, "force_n or mass_kg", "1e-6"),
+        (25.0, "force_n or mass_kg", "1e+3"),
+        (1.4 / 60.0, "position_m or velocity_mm_per_min", "1/60"),
+        (1.4 * 60.0, "position_m or velocity_mm_per_min", "60"),
+        (1.4e-3, "position_m or velocity_mm_per_min", "1e-3"),
+    ],
+)
+def test_a_wrong_unit_is_told_with_the_factor_between_units(value: float, columns: str, factor: str) -> None:
+    ratio = PlausibleRatio(0.05, 20.0, "a ratio", columns)
+    with pytest.raises(CampaignError) as fault:
+        check_units([{ratio: value}])
+    assert str(fault.value).endswith(f"(off by a factor of about {factor})")
 
 
 def test_a_quarter_of_every_setting_is_held_out() -> None:

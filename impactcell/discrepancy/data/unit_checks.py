@@ -48,9 +48,18 @@ def check_units(ratios_of_shots: Iterable[Mapping[PlausibleRatio, float]]) -> No
     for ratio, of_shots in values.items():
         median = float(np.median(of_shots))
         if not ratio.low < median < ratio.high:
-            power = round(math.log10(max(median, 1e-300)) / 3.0) * 3
             message = (
                 f"{ratio.name} is {median:.3g}, where about 1 is possible: check the unit of {ratio.columns} "
-                f"(off by a factor of about 1e{power:+d})"
+                f"(off by a factor of about {_likely_factor(median, ratio.columns)})"
             )
             raise CampaignError(message)
+
+
+def _likely_factor(value: float, columns: str) -> str:
+    """Factor between units that is nearest to a ratio: a power of 1000, or of a velocity that of minutes."""
+    decades = math.log10(max(value, 1e-300))
+    power = 3 * (round(decades / 3.0) or (1 if decades > 0.0 else -1))
+    factors = {f"1e{power:+d}": float(power)}
+    if "velocity" in columns:
+        factors |= {"60": math.log10(60.0), "1/60": -math.log10(60.0)}
+    return min(factors, key=lambda factor: abs(factors[factor] - decades))
