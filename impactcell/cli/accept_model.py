@@ -12,7 +12,7 @@ from impactcell.cell import in_place_of
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.own_taps import compare_on_own_taps
 from impactcell.errors import PredictionError, SettingsError
-from impactcell.physics import NOMINAL_PARAMETERS
+from impactcell.physics.law_table import NOMINAL_PARAMETERS
 from impactcell.prediction import Model
 from impactcell.process.console import print_note, print_result
 from impactcell.settings import CellConfig, read_cell

@@ -37,13 +37,11 @@ a `Plant`. Samples are smooth in the parameters while the sequence of events is 
 
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, ParameterKind, Phase
 from impactcell.physics.ensemble import Ensemble
-from impactcell.physics.law_table import NOMINAL_PARAMETERS
 from impactcell.physics.motion import ChannelSamples, Motion, TapEvent, TapEventKind, TapOutputs, Traces
 from impactcell.physics.plant import Plant, TapInput
 from impactcell.physics.simulate import simulate_driven, simulate_free_slide, simulate_tap
 
 __all__ = [
-    "NOMINAL_PARAMETERS",
     "ChannelSamples",
     "Effect",
     "Ensemble",

@@ -22,10 +22,9 @@ from impactcell.discrepancy.model import (
 )
 from impactcell.discrepancy.search.effect_grid import SMALL_STRENGTH, GridPoint, VisitedRange, effect_grid
 from impactcell.errors import PhysicsError
-from impactcell.physics import NOMINAL_PARAMETERS
 from impactcell.physics.effect import Covariates, ParameterKind
 from impactcell.physics.effects import LIBRARY
-from impactcell.physics.law_table import build_law_table
+from impactcell.physics.law_table import NOMINAL_PARAMETERS, build_law_table
 from impactcell.records import Samples
 
 FORWARD_STEP = 0.1
