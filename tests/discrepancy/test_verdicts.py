@@ -16,7 +16,8 @@ from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.report.sentences import headline
 from impactcell.discrepancy.search.conclusion import missing_shots
 from impactcell.discrepancy.search.confirmation import NestedModels, confirmed
-from impactcell.discrepancy.search.validation import Gap, GapChange, GapMeasure, Part
+from impactcell.discrepancy.search.gap import Gap, Part, narrows
+from impactcell.discrepancy.search.validation import GapChange, GapMeasure
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.records import Capture, Channel
 from tests.benchmarks._discrepancy_driven import Job, record
@@ -223,6 +224,27 @@ def test_what_hardly_narrows_the_friction_factors_is_not_confirmed_by_them(
         GapChange((Part.FACTORS,), *gaps, closed=0.05, low=0.03, high=0.1, p_value=0.01).is_real() is is_real
     )
     assert GapChange((Part.TRACES,), *gaps, closed=0.05, low=0.03, high=0.1, p_value=0.01).is_real()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "trace", "is_told"),
+    [
+        (1.88, 1.40, 2.51, False),  # a patch of friction that is in no library
+        (1.19, 0.84, 3.82, False),  # a magnet
+        (1.79, 0.98, 4.47, False),  # a machine that vibrates
+        (4.74, 1.65, 2.17, True),  # friction by direction beside a model error
+        (1.25, 1.10, 1.0, False),
+        (1.25, 1.05, 1.0, True),
+        (math.nan, math.nan, 1.0, False),
+    ],
+)
+def test_what_model_error_makes_of_the_friction_factors_has_no_name(
+    before: float, after: float, trace: float, *, is_told: bool
+) -> None:
+    """Each bent the factors by direction, and was called friction by direction."""
+    assert narrows(before, after, trace) is is_told
+    change = (Part.FACTORS,), Gap(trace, before), Gap(trace, after), 0.5, 0.2, 0.8, 0.001
+    assert GapChange(*change).is_real() is is_told
 
 
 @pytest.mark.parametrize(("p_value", "is_sure"), [(0.0005, True), (0.04, True), (0.06, False)])

@@ -29,6 +29,7 @@ from impactcell.discrepancy.search.confirmation import NestedModels
 from impactcell.discrepancy.search.context import Mapper, SearchContext
 from impactcell.discrepancy.search.evidence import ALPHA, CandidateScan, ModelEvidence, scan_candidates
 from impactcell.discrepancy.search.experiment_design import Proposal, propose_experiments
+from impactcell.discrepancy.search.gap import Gap, Part
 from impactcell.discrepancy.search.held_out import HeldOutOutcome, OpenedShots
 from impactcell.discrepancy.search.indistinguishability import CandidateFit, compare_fits
 from impactcell.discrepancy.search.model_error import (
@@ -47,10 +48,8 @@ from impactcell.discrepancy.search.validation import (
     MAX_P_VALUE,
     MIN_CLOSED_SHARE,
     MIN_OPEN_GAP,
-    Gap,
     GapChange,
     GapMeasure,
-    Part,
     Validation,
 )
 

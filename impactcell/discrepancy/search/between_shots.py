@@ -4,8 +4,9 @@ What remains in the traces says nothing of them: they show in the friction facto
 independent. One is taken if it explains more of the variance of the factors than one without part in it would
 by chance, by the F test and by shots exchanged at random, and if nothing in the traces explains more of it:
 parts that slide apart by direction make friction by position look like friction by direction, and a fit of
-the traces narrows the factors then. And its size is told from nothing: what the model lacks in the traces, in
-one direction more than in the other, say, makes the factors go with it as well.
+the traces narrows the factors then. What the model lacks in the traces, in one direction more than in the
+other, say, makes the factors go with it as well: so they must become narrower by more than that explains,
+and the size of the effect must be told from nothing.
 """
 
 import math
@@ -20,6 +21,7 @@ from impactcell.discrepancy.search.acceptance import SelectionResult
 from impactcell.discrepancy.search.candidate_fits import FitTask, run_tasks
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.evidence import ALPHA, ModelEvidence
+from impactcell.discrepancy.search.gap import narrows
 from impactcell.discrepancy.search.indistinguishability import CandidateFit, compare_fits, widest_rival
 from impactcell.discrepancy.search.model_error import shared_error
 from impactcell.discrepancy.search.policy import POLICY
@@ -62,7 +64,7 @@ def accept_between_shots(
     in_order = chance_of_order(context, evidence, effect, nominal.shot_parameters.log_factor)
     chance = chance if in_order is None else max(chance, in_order)
     p_value = min(number * chance, 1.0)
-    if p_value > POLICY.between_shots_error or best.spread > POLICY.max_spread_ratio * nominal.spread:
+    if p_value > POLICY.between_shots_error or not narrows(nominal.spread, best.spread, context.gap(best)):
         return None
     shots = context.problem.count
     in_traces, explained = trace_rivals(best.spread, rivals, shots)

@@ -5,14 +5,8 @@ from dataclasses import dataclass, replace
 from itertools import takewhile
 
 from impactcell.discrepancy.model import Fit
-from impactcell.discrepancy.search.validation import (
-    MAX_P_VALUE,
-    GapChange,
-    GapMeasure,
-    Part,
-    counted_parts,
-    narrows,
-)
+from impactcell.discrepancy.search.gap import Part
+from impactcell.discrepancy.search.validation import MAX_P_VALUE, GapChange, GapMeasure, counted_parts
 
 VISIBLE_BESIDE = 1.2
 """Gap of the traces [noise floors] that others must leave without an effect for it to have a name beside
@@ -95,7 +89,7 @@ def _least_visible(
     whole, least = measure.gap(nested.largest), dict[str, float]()
     for effect in nested.added:
         model = nested.without(effect)
-        if model is None or narrows(gap := measure.gap(model), whole):
+        if model is None or whole.is_narrower(gap := measure.gap(model)):
             continue
         left = max(gap.trace, trained(frozenset(nested.added) - {effect}))
         if left < VISIBLE_BESIDE:

@@ -1,5 +1,6 @@
 """What all stages of a search share: the shots, what may be named, and the tests that a model has to pass."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -83,6 +84,9 @@ class SearchContext:
 
     def reaches_floor(self, model: Fit) -> bool:
         """Whether a model comes near the noise, where that is certain."""
+        return not (self.floor_is_certain and self.gap(model) > POLICY.max_rms_at_floor)
+
+    def gap(self, model: Fit) -> float:
+        """Gap that a model leaves in the traces [noise floors]."""
         shots, sizes = self.problem.shots, self.problem.sizes
-        misfit = shots.excitation.misfit_level(model.misfit(shots) / sizes, sizes)
-        return not (self.floor_is_certain and misfit > POLICY.max_rms_at_floor**2)
+        return math.sqrt(shots.excitation.misfit_level(model.misfit(shots) / sizes, sizes))

@@ -1,6 +1,5 @@
 """Does the gap fall on shots that were never used? Opened once, for every effect by itself."""
 
-import enum
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,7 +11,7 @@ from scipy.stats import t as student
 
 from impactcell.discrepancy.data import CHANNELS, PHASES, IndexArray, NoiseFloor, ReplicateSpread
 from impactcell.discrepancy.model import Fit, Problem, sample_phases, trajectory_of
-from impactcell.discrepancy.search.policy import POLICY
+from impactcell.discrepancy.search.gap import Gap, Part
 from impactcell.records import Samples
 
 MIN_OPEN_GAP = 1.05
@@ -25,8 +24,7 @@ MAX_P_VALUE = 0.1
 """One-sided error of the held-out shots' test, beside an interval above 0: they confirm what other shots have
 found at an error of 1 %, so that both together err once in a thousand."""
 MIN_CLOSED_SHARE = 0.02
-"""Share of the held-out gap that an effect must close: a fall may be certain and still be too small. Friction
-factors it must narrow by as much as the search asks for: what changes the traces changes them a little."""
+"""Share of the held-out gap that an effect must close: a fall may be certain and still be too small."""
 NOISE_TOLERANCE = 0.05
 """Relative error of a stated noise: two digits."""
 MAX_EXPECTED_GAP = 1.3
@@ -37,34 +35,6 @@ SHOWN, DECIDING = 0.95, 0.99
 
 Share = TypeVar("Share", float, Samples)
 """One share, or one a draw."""
-
-
-class Part(enum.StrEnum):
-    """In what a gap shows; effects between shots show in the friction factors only."""
-
-    TRACES = "traces"
-    FACTORS = "friction_factors"
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Gap:
-    """Gap of one model on one set of shots, in units of the noise floor.
-
-    Attributes
-    ----------
-    trace : float
-        RMS of the trace residuals over the sensors' noise.
-    factor : float
-        Spread of the friction factors about their law over their replicate spread; nan without replicates.
-    """
-
-    trace: float
-    factor: float
-
-    def of(self, parts: Iterable[Part]) -> float:
-        """Gap in some of its parts: the largest of them."""
-        values = [self.trace if part is Part.TRACES else self.factor for part in parts]
-        return max((value for value in values if not math.isnan(value)), default=math.nan)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,7 +62,7 @@ class GapChange:
 
     def is_real(self, max_p: float = MAX_P_VALUE) -> bool:
         """Whether independent shots agree that the gap falls, and by more than a trifle."""
-        if self.parts == (Part.FACTORS,) and not narrows(self.before, self.after):
+        if self.parts == (Part.FACTORS,) and not self.after.is_narrower(self.before):
             return False
         return self.low > 0.0 and self.closed >= MIN_CLOSED_SHARE and self.p_value <= max_p
 
@@ -270,11 +240,6 @@ class Validation:
     def gap_after(self) -> float:
         """Held-out gap of the final model."""
         return self.whole(self.held_out.after)
-
-
-def narrows(before: Gap, after: Gap) -> bool:
-    """Whether the friction factors become narrower by more than a trifle."""
-    return after.factor <= POLICY.max_spread_ratio * before.factor
 
 
 def counted_parts(
