@@ -401,6 +401,16 @@ def test_what_rotates_is_a_campaign_of_torque_angle_and_inertia(tmp_path: Path) 
         campaign.read(tmp_path / "c")
 
 
+def test_a_swing_that_ends_where_it_began_is_imported() -> None:
+    time = np.arange(0.0, 24.0 * np.pi, 0.01)
+    angle = 0.1 * np.exp(-0.002 * time) * np.cos(3.0 * time)
+    angle += np.random.default_rng(7).normal(0.0, 1e-4, time.size)
+    swing = table(t=("s", time), Winkel=("rad", angle))
+    imported = make_campaign([swing], guess([swing]))
+    assert imported.campaign.excitation is Excitation.FREE_SLIDE
+    assert not any("slides" in note for note in imported.notes)
+
+
 VOLTS = {"mass": 18.9, "velocity": 0.05}
 """Constants of a tap whose force was recorded in volts, 12.5 N each."""
 
