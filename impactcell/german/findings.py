@@ -37,6 +37,15 @@ GERMAN_STATES: Final = {
     "gap": "Abstand",
 }
 """What a law may be a function of, beside the quantities."""
+GERMAN_COVARIATES: Final = {
+    "speed of sliding": "Gleitgeschwindigkeit",
+    "position on the table": "Position auf dem Tisch",
+    "rate of indentation": "Eindrückgeschwindigkeit",
+    "time since first contact": "Zeit seit dem ersten Kontakt",
+    "contact force": "Kontaktkraft",
+    "column": "Spalte",
+}
+"""What a law of taps calls the same in its equation."""
 GERMAN_STEPS: Final = {
     "unpacking": "Auspacken",
     "import": "Dateien lesen",
@@ -101,11 +110,13 @@ def german_equation(equation: str) -> str:
     >>> german_equation("-s(u) sign(q') with s(u) = 0.5 u^2, u the position")
     "-s(u) sign(q') mit s(u) = 0,5 u^2, u = Position"
     """
-    names = {**GERMAN_QUANTITIES, **GERMAN_STATES}
+    names = {**GERMAN_QUANTITIES, **GERMAN_STATES, **GERMAN_COVARIATES}
     said = re.sub(r" with (?=s\()", " mit ", with_decimal_commas(equation))
     said = said.replace("u a column of shots.csv", "u = Spalte von shots.csv")
     said = said.replace("the part that differs: ", "davon der Unterschied: ")
-    return re.sub(r"\b([uw]) the (\w+)", lambda m: f"{m[1]} = {names.get(m[2], m[2])}", said)
+    said = said.replace(" and w the ", " und w the ")
+    words = "|".join(GERMAN_COVARIATES)
+    return re.sub(rf"\b([uw]) the ({words}|\w+)", lambda m: f"{m[1]} = {names.get(m[2], m[2])}", said)
 
 
 def german_headline(result: Mapping[str, Any]) -> str:

@@ -12,6 +12,7 @@ from impactcell.campaign import Coordinate, Excitation
 from impactcell.discrepancy.data import CHANNELS
 from impactcell.discrepancy.data.prepared_campaign import STRATEGIES
 from impactcell.discrepancy.data.prepared_shots import OWN_COVARIATES
+from impactcell.discrepancy.laws.law import COVARIATE_WORDS, Law
 from impactcell.discrepancy.machine import CATALOGUE, ECCENTRICITY
 from impactcell.discrepancy.report import german_machine_sentences, german_sentences, sentences
 from impactcell.discrepancy.report.machine_parameters import (
@@ -22,9 +23,10 @@ from impactcell.discrepancy.report.machine_parameters import (
 )
 from impactcell.discrepancy.report.page import SENTENCES, write_reports
 from impactcell.discrepancy.workflow import DiscrepancyResult
-from impactcell.german.findings import GERMAN_PHASES, REPORTS, with_decimal_commas
+from impactcell.german.findings import GERMAN_PHASES, REPORTS, german_equation, with_decimal_commas
 from impactcell.german.parameters import GERMAN, parameter_words
 from impactcell.physics.effects import LIBRARY
+from impactcell.physics.free_forms import FREE_FORMS
 from tests.discrepancy.test_report import Page
 from tests.discrepancy.test_workflow import investigated
 
@@ -171,6 +173,17 @@ def test_laws_of_a_machine_and_where_they_come_from_are_said_in_german() -> None
     assert german_machine_sentences.phrase("law_of_force_over_speed(u^2)") == (
         "Gesetz: Kraft über der Geschwindigkeit (u^2)"
     )
+
+
+@pytest.mark.parametrize("covariate", COVARIATE_WORDS)
+def test_the_equation_of_a_law_of_taps_is_all_german_and_its_numbers_are_short(covariate: str) -> None:
+    place = next(form for form in FREE_FORMS.values() if form.covariate == covariate)
+    law = Law("law_of_it", place, "u", "amplitude * (u / 0.024200000000000003)", (), ((0.0, 0.0242),))
+    assert law.equation.endswith(f"= amplitude * (u / 0.0242), u the {COVARIATE_WORDS[covariate]}")
+    told = german_equation(law.equation)
+    assert "(u / 0,0242), u = " in told
+    for word in ("of", "on", "the", "since", "first", "contact", "force", "with", "gap"):
+        assert not re.search(rf"\b{word}\b", told.partition(" mit s(u)")[2]), told
 
 
 @pytest.mark.parametrize(

@@ -75,7 +75,7 @@ class Law:
     @property
     def covariate(self) -> str:
         """What u is, in words; and w, where there is one."""
-        words = [_WORDS.get(name, f"column {printed(name)}") for name in self.place.covariates]
+        words = [COVARIATE_WORDS.get(name, f"column {printed(name)}") for name in self.place.covariates]
         return " and w the ".join(words)
 
     @property
@@ -91,6 +91,9 @@ class Law:
         )
         for parameter in self.parameters:
             function = re.sub(rf"\b{re.escape(parameter.name)}\b", _short(parameter.name), function)
+        function = re.sub(
+            r"\b\d+\.\d{5,}(?:e[+-]?\d+)?\b", lambda number: f"{float(number[0]):.5g}", function
+        )
         of = "u, w" if self.place.second else "u"
         return f"{self.place.effect.equation} with s({of}) = {function}, u the {self.covariate}"
 
@@ -130,7 +133,7 @@ def _run(text: str, identifier: str) -> Effect:
     return effect
 
 
-_WORDS = {
+COVARIATE_WORDS = {
     "speed": "speed of sliding",
     "position": "position on the table",
     "indentation": "indentation",
