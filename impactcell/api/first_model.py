@@ -8,8 +8,8 @@ import numpy as np
 
 from impactcell.api.friction import with_masses
 from impactcell.campaign import Campaign, Excitation, begun_before_contact, from_contact
-from impactcell.errors import CampaignError
-from impactcell.features import Features, extract
+from impactcell.errors import CampaignError, PhysicsError, PredictionError
+from impactcell.features import Features, extract, impulse_balance
 from impactcell.prediction.contact_onset import fit_plant_and_onset
 from impactcell.prediction.plant_fit import PlantFit
 from impactcell.process.console import print_note
@@ -71,14 +71,28 @@ def fit_first_model(campaign: Campaign, name: str, source: str) -> FirstModel:
     for note in notes:
         print_note(note)
     taps = with_masses([extract(shot) for shot in struck.shots])
-    fit, _, _ = fit_plant_and_onset(
-        _with_one_contact(taps), struck.gravity_m_s2, begun_before_contact(campaign, struck), name
-    )
+    doubt = _common_doubt(taps)
+    try:
+        fit, _, _ = fit_plant_and_onset(
+            _with_one_contact(taps), struck.gravity_m_s2, begun_before_contact(campaign, struck), name
+        )
+    except (PredictionError, PhysicsError) as fault:
+        if not doubt:
+            raise
+        raise PredictionError(f"{source}: {doubt}; so no plant could be fitted: {fault}") from fault
     provenance = {"made by": "impactcell", "fitted to": f"{len(fit.used)} taps of {source}"}
     fit = replace(fit, model=replace(fit.model, provenance=provenance))
-    return FirstModel(
-        fit, len(taps), tuple(_shortcomings(fit, float(np.median([t.capture.mass_kg for t in taps]))))
-    )
+    shortcomings = _shortcomings(fit, float(np.median([t.capture.mass_kg for t in taps])))
+    return FirstModel(fit, len(taps), (*([doubt] if doubt else []), *shortcomings))
+
+
+def _common_doubt(taps: Sequence[Features]) -> str:
+    """Say what cannot be in most of the taps, as of a wrong unit or sign; empty where nothing is."""
+    found = [(tap.capture.cycle, texts[0]) for tap in taps if (texts := impulse_balance.doubts(tap))]
+    if 2 * len(found) <= len(taps):
+        return ""
+    cycle, text = found[0]
+    return f"in {len(found)} of {len(taps)} taps, cycle {cycle} for one, {text}"
 
 
 def _with_one_contact(taps: Sequence[Features]) -> Sequence[Features]:

@@ -7,7 +7,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
+from impactcell.cell.preprocessing import fill_defaults
 from impactcell.errors import FieldbusError
+from impactcell.features import extract, impulse_balance
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.modbus_client import ModbusClient
@@ -17,7 +19,7 @@ from impactcell.fieldbus.transports import transport_for
 from impactcell.prediction.mass_interpolation import velocity_range_m_s
 from impactcell.process.console import print_result
 from impactcell.records import Capture, Channel
-from impactcell.service.factory import module_link
+from impactcell.service.factory import cell_design, module_link
 from impactcell.settings import CellConfig, read_cell
 
 ROUNDING: Final = 1e-3
@@ -46,7 +48,10 @@ def probe(cell: Path) -> None:
     rows = [("link", f"{link}, {1e3 * result.round_trip_s:.2f} ms a request"), *_rows(result)]
     rows.insert(1, ("in flight", result.window))
     if result.capture is not None:
-        rows += [("look at", text) for text in _unlike(config, result.capture)]
+        tap = extract(fill_defaults(cell_design(config).defaults, result.capture))
+        rows += [
+            ("look at", text) for text in (*impulse_balance.doubts(tap), *_unlike(config, result.capture))
+        ]
     rows += [("no promise", text) for text in not_promised(config.register_map)]
     print_result("\n".join(f"{name:12}{text}" for name, text in rows))
     if result.faults:

@@ -54,14 +54,14 @@ async def test_what_is_wrong_is_named(tmp_path: Path, change: dict[str, object],
 
 
 @pytest.mark.parametrize(
-    ("name", "unit", "wrong", "told"),
+    ("name", "unit", "wrong", "told", "doubts"),
     [
-        ("velocity", "mm/min", "mm/s", "velocity 252000 mm/min is not within the 2000 to 6000 mm/min"),
-        ("mass", "kg", "g", "mass 0.0189 kg is not within the "),
+        ("velocity", "mm/min", "mm/s", "velocity 252000 mm/min is not within the 2000 to 6000 mm/min", 1),
+        ("mass", "kg", "g", "mass 0.0189 kg is not within the ", 2),  # force and motion contradict it, too
     ],
 )
 async def test_a_wrong_unit_of_what_the_model_knows_is_named(
-    tmp_path: Path, name: str, unit: str, wrong: str, told: str
+    tmp_path: Path, name: str, unit: str, wrong: str, told: str, doubts: int
 ) -> None:
     content = yaml.safe_load((CONFIG / "maps" / "fpga-v1.yaml").read_text())
     assert content["registers"][name]["unit"] == unit
@@ -74,7 +74,20 @@ async def test_a_wrong_unit_of_what_the_model_knows_is_named(
             pass
     assert f"look at     {told}" in out
     assert f"see unit and scale of {name} in the map" in out
-    assert out.count("look at") == 1
+    assert out.count("look at") == doubts
+
+
+async def test_a_scale_that_contradicts_the_motion_is_named(tmp_path: Path) -> None:
+    text = (CONFIG / "maps" / "fpga-v1.yaml").read_text()
+    (tmp_path / "wrong.yaml").write_text(text.replace("unit: N, scale: 0.025", "unit: N, scale: 0.1"))
+    strikes = {"period_s": 0.1, "cycles": 1, "velocities_mm_per_min": [4200.0]}
+    async with simulator(tmp_path, strikes=strikes) as module:
+        cell = write_cell(tmp_path, module["port"], module={"register_map": str(tmp_path / "wrong.yaml")})
+        while "tap         cycle 1" not in (out := (await probed(cell))[1]):
+            pass
+    (look,) = [line for line in out.splitlines() if line.startswith("look at")]
+    assert "its motion shows " in look
+    assert "see unit and scale of force, position and mass" in look
 
 
 async def test_a_tap_beside_the_calibration_of_its_mass_is_blamed_on_no_unit(tmp_path: Path) -> None:
