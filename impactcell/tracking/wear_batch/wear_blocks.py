@@ -39,10 +39,10 @@ from impactcell.tracking.wear_batch.block_filter import (
 from impactcell.tracking.wear_batch.slope_grid import relay
 from impactcell.tracking.wear_batch.wear_report import WearMoments
 
-KEPT_BLOCKS = 64
+KEPT_BLOCKS = 71
 """Closed blocks that are kept and weighed again with every new one: the cycles of commissioning."""
-FEWEST_BLOCKS = 12
-"""Blocks before which the bank says as much."""
+FEWEST_BLOCKS = 19
+"""Blocks before which the bank says as much: some hundred cycles."""
 FIRST_SLOPE_STD = 0.02
 """Standard deviation from which the first grid is made, standard deviations of one estimate a cycle."""
 OFFSETS = np.array(
@@ -132,7 +132,9 @@ def append(wear: WearBlocks, index: int, value: float, weight: float, change: fl
     change : float
         What is known of a batch change just before it.
     """
-    if len(wear.blocks) == 0 or wear.open_cycles >= BLOCK or change > 0.0:
+    # a change inside a block costs that block; the first cycles are the reference, and stand each by itself
+    size = 1 if index - wear.origin <= BLOCK and not len(wear.segments) else BLOCK
+    if len(wear.blocks) == 0 or wear.open_cycles >= size or change > 0.0:
         opened = np.array([[weight, float(index), value, change]])
         return replace(wear, blocks=np.vstack([wear.blocks, opened]), open_cycles=1)
     blocks = wear.blocks.copy()
@@ -157,7 +159,7 @@ def update(wear: WearBlocks, model: BlockModel) -> WearBlocks:
         # in one piece, as in the first grids: one machine code serves both
         evidence += filter_slopes(grid.copy(), segments, blocks, wear.origin, before, model)
         return _renewed(wear, closed, *_relaid(grid, evidence, segments))
-    if closed < FEWEST_BLOCKS:
+    if closed < FEWEST_BLOCKS and not len(wear.slopes):
         return wear
     if len(wear.slopes):
         around = _moments(wear.slopes[:, 0], wear.slopes[:, 1])

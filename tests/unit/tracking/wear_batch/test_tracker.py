@@ -302,3 +302,12 @@ def test_no_readings_whatever_break_the_state(readings, config):
         assert tracked.wear.quality is Quality.BAD or finite(tracked)
         assert tracked.used or tracked.wear.reason
     assert pack(unpack(TrackerState, pack(state))) == pack(state)
+
+
+def test_a_change_among_the_first_cycles_leaves_the_level_that_of_the_cycles_before_it():
+    """Friction at the first batch is what it was drawn with, whether five cycles of it came or hundreds."""
+    lasts = [run(UNKNOWN, series(120, seed=seed, slope=0.0, step=4.0, at=5))[-1] for seed in range(10)]
+    off = np.array([(last.wear.level - 0.2) / last.wear.level_std for last in lasts])
+    assert np.sqrt(np.mean(off**2)) < 1.8
+    for last in lasts:
+        assert abs(last.batch.offset - 4.0 * STD) < 3.5 * last.batch.offset_std
