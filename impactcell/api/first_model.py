@@ -7,10 +7,10 @@ from typing import Final
 import numpy as np
 
 from impactcell.api.friction import with_masses
-from impactcell.campaign import Campaign, Excitation, begun_before_contact, from_contact
+from impactcell.campaign import Campaign, Excitation, from_contact
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
 from impactcell.features import Features, extract, impulse_balance
-from impactcell.prediction.contact_onset import fit_plant_and_onset
+from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.prediction.plant_fit import PlantFit
 from impactcell.process.console import print_note
 
@@ -73,9 +73,7 @@ def fit_first_model(campaign: Campaign, name: str, source: str) -> FirstModel:
     taps = with_masses([extract(shot) for shot in struck.shots])
     doubt = _common_doubt(taps)
     try:
-        fit, _, _ = fit_plant_and_onset(
-            _with_one_contact(taps), struck.gravity_m_s2, begun_before_contact(campaign, struck), name
-        )
+        fit = fit_plant(_with_one_contact(taps), struck.gravity_m_s2, name)
     except (PredictionError, PhysicsError) as fault:
         if not doubt:
             raise

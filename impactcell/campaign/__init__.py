@@ -2,7 +2,7 @@
 
 from impactcell.campaign.contents import COLUMNS, Campaign, Coordinate, Excitation, Sensor
 from impactcell.campaign.faults import LARGEST, naming
-from impactcell.campaign.pretrigger import begun_before_contact, from_contact
+from impactcell.campaign.pretrigger import from_contact
 from impactcell.campaign.reading import read
 from impactcell.campaign.writing import write
 
@@ -13,7 +13,6 @@ __all__ = [
     "Coordinate",
     "Excitation",
     "Sensor",
-    "begun_before_contact",
     "from_contact",
     "naming",
     "read",

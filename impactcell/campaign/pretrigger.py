@@ -21,6 +21,9 @@ MIN_LATE_STEPS = 3.0
 """Sampling steps by which a contact has to come late before a record is taken to have begun earlier."""
 MIN_LATE_S = 1e-3
 """Time by which it has to come late: longer than a sensor lags or a channel is skewed."""
+ONSET_STD = 0.5
+"""Standard deviation of contact about t = 0, in sampling steps, where a record began before it:
+its first sample may lie anywhere within one, and where a soft contact shows is off by as much again."""
 STATED_LATE_S = 5e-3
 """The same where samples before t = 0 say that t = 0 was meant to be the contact."""
 
@@ -45,16 +48,19 @@ def from_contact(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     changed = sum(before is not after for before, after in zip(shots, kept, strict=True))
     if changed:
         notes.append(f"Samples before contact (pretrigger) of {changed} shots are left out of the fits.")
-    return replace(campaign, shots=kept), tuple(notes)
+    counted = tuple(
+        after if after is before else _with_open_onset(after)
+        for before, after in zip(campaign.shots, kept, strict=True)
+    )
+    return replace(campaign, shots=counted), tuple(notes)
 
 
-def begun_before_contact(recorded: Campaign, counted: Campaign) -> frozenset[int]:
-    """Give the numbers of the shots that began before contact, of a campaign and what `from_contact` makes.
-
-    Their contact is known to a sampling step only.
-    """
-    pairs = zip(recorded.shots, counted.shots, strict=True)
-    return frozenset(after.cycle for before, after in pairs if before is not after)
+def _with_open_onset(shot: Capture) -> Capture:
+    """Say how well contact is known of a record that shows it by its samples only: to a sampling step."""
+    channels = (shot.force, shot.position, shot.actuator)
+    times = next((one.time_s for one in channels if one is not None and len(one.time_s) > 1), None)
+    step_s = 0.0 if times is None else float(np.median(np.diff(times)))
+    return replace(shot, onset_std_s=ONSET_STD * step_s)
 
 
 def _late_onset(force: Channel | None) -> int | None:

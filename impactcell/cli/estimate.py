@@ -6,19 +6,18 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterable, Sequence
-from collections.abc import Set as AbstractSet
 from pathlib import Path
 from typing import TextIO
 
 from impactcell.api.friction import calibrated_where_possible, with_masses
-from impactcell.campaign import Campaign, Excitation, begun_before_contact, from_contact, naming, read
+from impactcell.campaign import Campaign, Excitation, from_contact, naming, read
 from impactcell.cli.paths import check_output
 from impactcell.discrepancy.data import check_campaign_units
 from impactcell.errors import CampaignError, PredictionError
 from impactcell.features import Features, extract
 from impactcell.prediction import Model, estimate_from_features
-from impactcell.prediction.contact_onset import fit_plant_and_onset
 from impactcell.prediction.free_slide_friction import free_slide_friction
+from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.process.console import print_note, print_result
 from impactcell.process.progress import progress
 from impactcell.process.whole_files import write_whole
@@ -60,8 +59,7 @@ def estimate(
     """
     if output is not None:
         check_output(output, CampaignError)
-    recorded = read(campaign)
-    campaign_data, notes = from_contact(recorded)
+    campaign_data, notes = from_contact(read(campaign))
     for note in notes:
         print_note(note)
     if campaign_data.excitation is Excitation.DRIVEN:
@@ -78,7 +76,7 @@ def estimate(
         ]
     else:
         taps = with_masses([extract(shot) for shot in campaign_data.shots])
-        rows = _of_taps(campaign_data, taps, cell, begun_before_contact(recorded, campaign_data))
+        rows = _of_taps(campaign_data, taps, cell)
     if as_json:
         sys.stdout.write(_as_json(rows))
     elif output is None:
@@ -99,12 +97,9 @@ def estimate(
 
 
 def _of_taps(
-    campaign: Campaign, taps: Sequence[Features], cell: Path | None, begun_before: AbstractSet[int]
+    campaign: Campaign, taps: Sequence[Features], cell: Path | None
 ) -> list[tuple[int, FrictionEstimate]]:
-    """Estimate every tap, by the cell's model or by one that is fitted to the campaign.
-
-    Contact of the shots that begun before it is known to a sampling step only.
-    """
+    """Estimate every tap, by the cell's model or by one that is fitted to the campaign."""
     estimate_of: Callable[[Features, Model], FrictionEstimate] = estimate_from_features
     if cell is not None:
         from impactcell.settings import read_cell
@@ -112,10 +107,14 @@ def _of_taps(
         plant = read_cell(cell).model
     else:
         with progress("fitting the plant", 1):
-            fitted, taps, onset_s = fit_plant_and_onset(taps, campaign.gravity_m_s2, begun_before)
+            fitted = fit_plant(taps, campaign.gravity_m_s2)
         plant, estimate_of = fitted.model, fitted.estimate
-        if onset_s:
-            print_note(f"contact of {len(begun_before)} shots was {1e6 * onset_s:+.3g} µs off, within a step")
+        begun_before = sum(tap.capture.onset_std_s > 0.0 for tap in taps)
+        if begun_before:
+            print_note(
+                f"contact of {begun_before} shots is fitted with them, within a sampling step: on average "
+                f"{1e6 * fitted.onset_s:+.3g} µs from where their force begins"
+            )
         print_note(
             f"plant fitted to {len(fitted.used)} of {len(taps)} shots: {fitted.sentence}; "
             f"residuals {fitted.gap:.3g} times the noise"

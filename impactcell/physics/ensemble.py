@@ -145,6 +145,7 @@ class Ensemble:
         *,
         mass_kg: Samples | None = None,
         initial_speed_m_s: Samples | None = None,
+        onset_s: Samples | None = None,
     ) -> Traces:
         """Integrate every tap and sample it at the ensemble's times.
 
@@ -156,10 +157,13 @@ class Ensemble:
             Multiplies mu_s and mu_k of each shot.
         mass_kg, initial_speed_m_s : ndarray of shape (n,), optional
             Instead of the taps' own.
+        onset_s : ndarray of shape (n,), optional
+            When first contact was, as for `samples`.
         """
-        return self._split(
-            self.samples(values, friction_factor, mass_kg=mass_kg, initial_speed_m_s=initial_speed_m_s)
+        out = self.samples(
+            values, friction_factor, mass_kg=mass_kg, initial_speed_m_s=initial_speed_m_s, onset_s=onset_s
         )
+        return self._split(out)
 
     def samples(
         self,

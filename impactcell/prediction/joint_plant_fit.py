@@ -1,7 +1,8 @@
 """The plant of a campaign: k, b and mu_k/mu_s shared by all taps, one friction a tap, fitted together.
 
-Least squares on the waveforms of all taps. Each tap's mu_k is eliminated from the normal equations, so the
-cost grows with the number of taps, not with its cube.
+Least squares on the waveforms of all taps. Each tap's own numbers are eliminated from the normal equations,
+so the cost grows with the number of taps, not with its cube: its mu_k and, where the recorder does not tell
+it, its first contact. Half a sampling step beside where contact was no plant explains a tap.
 """
 
 import math
@@ -14,15 +15,18 @@ from impactcell.errors import NotConvergedError, PhysicsError, PredictionError
 from impactcell.features import Features, required
 from impactcell.physics import Plant
 from impactcell.prediction import gauss_newton
+from impactcell.prediction.capture_blocks import linearised_model
 from impactcell.prediction.gauss_newton import Step, StopRule
 from impactcell.prediction.linearised_model import (
     DAMPING,
+    LATEST_ONSET,
     MU_K,
+    ONSET,
+    PARAMETERS,
     RATIO,
     STIFFNESS,
     Linearisation,
     LinearisedModel,
-    linearised_model,
     parameters_of,
 )
 from impactcell.prediction.model import Model, Prior
@@ -93,7 +97,7 @@ def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted
         plant = replace(start, mu_k=mu_k, mu_s=mu_k / INITIAL_RATIO)
         try:
             responses.append(linearised_model(tap, plant))
-            thetas.append(parameters_of(plant))
+            thetas.append(np.append(parameters_of(plant), 0.0))
             slide = required(tap.slide)
             intervals.append(interval_of_blocks(responses[-1], slide.separation_s, slide.stop_s))
         except PhysicsError as fault:
@@ -102,6 +106,7 @@ def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted
         raise PredictionError(f"no tap of the campaign can be modelled; {faults[0]}")
     fitted = _CampaignProblem(responses, thetas[0][SHARED], WEAK_STD).fit(np.array(thetas))
     thetas_fitted, covariance = fitted.theta, fitted.covariance
+    onsets = [row[ONSET] * one.onset_std_s for row, one in zip(thetas_fitted, responses, strict=True)]
     count = sum(response.size for response in responses)
     misfit = math.sqrt(fitted.chi2 / max(count - len(thetas_fitted) - 3, 1))
     if misfit > MISFIT_THRESHOLD:
@@ -120,7 +125,9 @@ def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted
     model = Model(name, plant, prior)
     scatter = ratio_scatter(usable, model)
     model = replace(model, prior=replace(prior, ratio_std=math.hypot(prior.ratio_std, scatter)))
-    return PlantFit(model, tuple(tap.capture.cycle for tap in usable), misfit, float(stds[0]))
+    open_onset = [one.onset_std_s > 0.0 for one in responses]
+    onset_s = float(np.mean(np.array(onsets)[open_onset])) if any(open_onset) else 0.0
+    return PlantFit(model, tuple(tap.capture.cycle for tap in usable), misfit, float(stds[0]), onset_s)
 
 
 def contact_constants(tap: Features) -> tuple[float, float]:
@@ -194,7 +201,7 @@ def ratio_scatter(taps: Sequence[Features], model: Model) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _CampaignPoint:
-    """Parameters of every tap, shape (n, 4), the linear model of each, and half of their sums of squares."""
+    """Parameters of every tap, shape (n, 5), the linear model of each, and half of their sums of squares."""
 
     theta: Samples
     taps: list[Linearisation]
@@ -213,7 +220,7 @@ class _CampaignFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _CampaignProblem:
-    """The shared parameters, held to `anchor` within `spread`, and every tap's mu_k, which is eliminated."""
+    """The shared parameters, held to `anchor` within `spread`, and every tap's own, which are eliminated."""
 
     responses: Sequence[LinearisedModel]
     anchor: Samples
@@ -226,26 +233,40 @@ class _CampaignProblem:
 
     def linearise(self, theta: Samples) -> _CampaignPoint:
         """Linearise the model of every tap."""
-        taps = [response.linearise(row) for response, row in zip(self.responses, theta, strict=True)]
-        return _CampaignPoint(theta, taps, 0.5 * sum(tap.chi2 for tap in taps))
+        taps = [
+            response.linearise(row[: response.parameters])
+            for response, row in zip(self.responses, theta, strict=True)
+        ]
+        beside = float(theta[:, ONSET] @ theta[:, ONSET])
+        return _CampaignPoint(theta, taps, 0.5 * (sum(tap.chi2 for tap in taps) + beside))
 
     def step(self, start: _CampaignPoint, damping: float) -> Step:
-        """Solve for the shared parameters; each tap's mu_k follows them."""
+        """Solve for the shared parameters; each tap's own follow them."""
         prior = np.diag(1.0 / self.spread**2)
         curvature, gradient = prior.copy(), prior @ (start.theta[0, SHARED] - self.anchor)
         eliminated = []
-        for tap in start.taps:
-            h, cross, g = float(tap.normal[MU_K, MU_K]), tap.normal[SHARED, MU_K], float(tap.slope[MU_K])
-            if not h > 0.0:
+        for tap, row in zip(start.taps, start.theta, strict=True):
+            own = [MU_K, *range(PARAMETERS, len(tap.slope))]
+            inside, cross, slope = (
+                tap.normal[np.ix_(own, own)],
+                tap.normal[own, SHARED],
+                tap.slope[own].copy(),
+            )
+            inside[1:, 1:] += np.eye(len(own) - 1)
+            slope[1:] += row[own[1:]]
+            if not inside[0, 0] > 0.0:
                 raise NotConvergedError(NO_REST)  # the friction of a tap does not show in its samples
-            curvature += tap.normal[SHARED, SHARED] - np.outer(cross, cross) / h
-            gradient += tap.slope[SHARED] - cross * (g / h)
-            eliminated.append((h, cross, g))
+            followed, moved = np.linalg.solve(inside, cross), np.linalg.solve(inside, slope)
+            curvature += tap.normal[SHARED, SHARED] - cross.T @ followed
+            gradient += tap.slope[SHARED] - cross.T @ moved
+            eliminated.append((own, followed, moved))
         step = -np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), gradient)
         length, step = float(step @ curvature @ step), np.clip(step, -MAX_STEP, MAX_STEP)
         theta = start.theta.copy()
         theta[:, SHARED] += step
-        theta[:, MU_K] -= np.array([(g + cross @ step) / h for h, cross, g in eliminated])
+        for row, (own, followed, moved) in zip(theta, eliminated, strict=True):
+            row[own] -= moved + followed @ step
+        theta[:, ONSET] = np.clip(theta[:, ONSET], -LATEST_ONSET, LATEST_ONSET)
         return Step(theta, length, np.asarray(np.linalg.inv(curvature)))
 
     def noise(self, at: _CampaignPoint) -> float:  # noqa: ARG002  # what a misfit adds is weighed afterwards
@@ -266,7 +287,8 @@ def _fit_reweighted(
     for _ in range(REWEIGHTING_ROUNDS):
         reweighted = [
             response.reweighted(
-                std_factors(response.linearise(row).residual, interval) * LATE_FACTORS[interval]
+                std_factors(response.linearise(row[: response.parameters]).residual, interval)
+                * LATE_FACTORS[interval]
             )
             for response, row, interval in zip(responses, thetas, intervals, strict=True)
         ]

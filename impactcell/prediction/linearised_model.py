@@ -1,8 +1,9 @@
 """What the model says a capture should be: blocks of force and position for given parameters, and residuals.
 
 theta = ln(mu_k, mu_k / mu_s, k, b), with stiffness k [N/m] and damping b [N s/m] of the contact. Steps in it
-are relative, whatever the units. z (`kink_coordinate`) says whether the part sticks before it moves; at z = 0
-(the kink) the response to theta has a bend.
+are relative, whatever the units. Where the recorder does not tell first contact, theta has its moment as
+well, in standard deviations of what is known of it. z (`kink_coordinate`) says whether the part sticks before
+it moves; at z = 0 (the kink) the response to theta has a bend.
 """
 
 import math
@@ -12,56 +13,35 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.errors import PhysicsError
-from impactcell.features import Features, required
 from impactcell.numerics.jit import compiled
-from impactcell.physics import Ensemble, Plant, TapEventKind, TapInput, simulate_tap
-from impactcell.prediction.block_averaging import (
-    FINE_FORCE_BLOCK_S,
-    FINE_POSITION_BLOCK_S,
-    FORCE_BLOCK_S,
-    POSITION_BLOCK_S,
-    BlockMeans,
-    average_blocks,
-)
-from impactcell.records import Capture, Samples
+from impactcell.physics import Ensemble, Plant, TapInput
+from impactcell.prediction.block_averaging import BlockMeans
+from impactcell.records import Samples
 
-MU_K, RATIO, STIFFNESS, DAMPING = range(4)
+MU_K, RATIO, STIFFNESS, DAMPING, ONSET = range(5)
 """Places in theta."""
 PARAMETERS = 4
-"""Length of theta."""
+"""Length of theta without the moment of first contact."""
 JUST_STICKING = 1e-7
 """z above which the model is that of a part that sticks first (see above)."""
-STEP_SENSES = np.array([1.0, -1.0, 1.0, -1.0])
+STEP_SENSES = np.array([1.0, -1.0, 1.0, -1.0, 1.0])
 """Senses of small steps in theta that do not make a part slip that sticks."""
 RELATIVE_STEP = 1e-5
 """Step of a difference in theta: small against the noise, large against rounding. Our choice."""
-STEPS_OUT = STEP_SENSES * RELATIVE_STEP
-STEPS = np.vstack([np.zeros(PARAMETERS), np.diag(STEPS_OUT)])
-KINK_SPAN_S = 1.5e-4
-"""How far to either side of an event of the start, s, blocks are short: the fit has its event there. With
-half of it, twice and four times the errors of mu_s are the same to 1e-3 of themselves."""
-
-AT_THE_HALT_S = 1e-9
-"""A sample this near to the actuator's halt, s, is of before or after it by rounding alone: modules give
-times in whole ns."""
-
-
-def tap_input(capture: Capture) -> TapInput:
-    """Turn a capture's command into a tap for the model; without a stroke the actuator halts by itself."""
-    return TapInput(
-        velocity_m_s=capture.velocity_m_s,
-        mass_kg=capture.mass_kg,
-        stroke_m=capture.stroke_m,
-        direction=capture.direction,
-        halts_at_separation=math.isinf(capture.stroke_m),
-        start_m=capture.start_m,
-        dwell_s=capture.dwell_s,
-    )
+ONSET_STEP = 1e-3
+"""The same of first contact, in its standard deviations. Our choice."""
+LATEST_ONSET = 2.0
+"""How far from t = 0 first contact may lie, in its standard deviations: a sampling step."""
+STEPS_OUT = STEP_SENSES * np.array([*[RELATIVE_STEP] * PARAMETERS, ONSET_STEP])
+STEPS = np.vstack([np.zeros(PARAMETERS), np.diag(STEPS_OUT[:PARAMETERS]), np.zeros(PARAMETERS)])
+"""Of the parameters of the plant, in each of the copies of a tap that are integrated, shape (6, 4)."""
+ONSET_STEPS = ONSET_STEP * np.eye(1, ONSET + 2, ONSET + 1)[0]
+"""Of first contact, in each of the copies, shape (6,)."""
 
 
 def with_parameters(plant: Plant, theta: Samples) -> Plant:
-    """Give a plant the parameters `theta`, shape (4,)."""
-    mu_k, ratio, stiffness, damping = np.exp(theta).tolist()
+    """Give a plant the parameters `theta`, shape (p,)."""
+    mu_k, ratio, stiffness, damping = np.exp(theta[:PARAMETERS]).tolist()
     return replace(
         plant, stiffness_n_per_m=stiffness, damping_n_s_per_m=damping, mu_s=mu_k / ratio, mu_k=mu_k
     )
@@ -81,9 +61,9 @@ class Linearisation:
     Attributes
     ----------
     residual : ndarray, shape (n,)
-    normal : ndarray, shape (4, 4)
+    normal : ndarray, shape (p, p)
         Product of the derivative with itself.
-    slope : ndarray, shape (4,)
+    slope : ndarray, shape (p,)
         Product of the derivative with the residuals.
     chi2 : float
         Sum of squares of the residuals.
@@ -104,16 +84,27 @@ class LinearisedModel:
         Its effects and gravity are kept; its four nominal parameters are those asked for.
     tap : TapInput
     force, position : BlockMeans
+    onset_std_s : float
+        Of the moment of first contact; it is fitted where this is above 0.
+
+    Attributes
+    ----------
+    parameters : int
+        Length p of theta.
     """
 
-    def __init__(self, plant: Plant, tap: TapInput, force: BlockMeans, position: BlockMeans) -> None:
+    def __init__(
+        self, plant: Plant, tap: TapInput, force: BlockMeans, position: BlockMeans, onset_std_s: float = 0.0
+    ) -> None:
         self.tap = tap
+        self.onset_std_s = onset_std_s
+        self.parameters = PARAMETERS + (onset_std_s > 0.0)
         self.force_time_s, self.position_time_s = force.time_s, position.time_s
         self.size = len(force.values) + len(position.values)
         self._values = np.concatenate([force.values, position.values])
         self._weights = 1.0 / np.concatenate([force.std, position.std])
         self._weight_n = tap.mass_kg * plant.gravity_m_s2
-        copies = PARAMETERS + 1
+        copies = self.parameters + 1
         self._ensemble = Ensemble(
             [tap] * copies,
             tuple(plant.effects),
@@ -164,7 +155,7 @@ class LinearisedModel:
 
         Parameters
         ----------
-        theta : ndarray, shape (4,)
+        theta : ndarray, shape (p,)
         side : int
             -1: as if breakaway were immediate, whatever mu_s. 0 or +1: as the parameters say.
         beyond : float
@@ -175,50 +166,23 @@ class LinearisedModel:
         PhysicsError
             The motion is not finite with these parameters.
         """
-        rows = np.exp(theta + STEPS)
+        count = self.parameters
+        rows = np.exp(theta[:PARAMETERS] + STEPS[: count + 1])
         mu_k, damping = rows[:, MU_K], rows[:, DAMPING]
         mu_s = mu_k / rows[:, RATIO]
         if side < 0:
             mu_s = np.minimum(mu_s, damping * self.tap.velocity_m_s / self._weight_n * (1.0 - 1e-7))
         table = self._table.copy()
         table[:, 0], table[:, 1], table[:, 2], table[:, 3] = rows[:, STIFFNESS], damping, mu_s, mu_k
-        traces = self._ensemble.traces(table)
-        fields = _linearise(traces.force_n, traces.position_m, self._values, self._weights, STEPS_OUT, beyond)
+        onset_s = None
+        if count > PARAMETERS:
+            onset_s = self.onset_std_s * (theta[ONSET] + ONSET_STEPS)
+        traces = self._ensemble.traces(table, onset_s=onset_s)
+        steps = STEPS_OUT[:count]
+        fields = _linearise(traces.force_n, traces.position_m, self._values, self._weights, steps, beyond)
         if not math.isfinite(fields[3]):
             raise PhysicsError("the motion is not finite with these parameters")
         return Linearisation(*fields)
-
-
-def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
-    """Average a capture over blocks, fine where `plant` has its events and contact was lost.
-
-    Parameters
-    ----------
-    features : Features
-        Of a capture with force, position, a mass and a velocity.
-    plant : Plant
-        Near enough for its events to tell where the kinks are.
-
-    Raises
-    ------
-    PredictionError, PhysicsError
-        The capture does not show its slide, or the plant has no motion.
-    """
-    tap = tap_input(features.capture)
-    motion = simulate_tap(plant, tap)
-    kinks = [*(event.time_s for event in motion.events), required(features.separation).value]
-    spans = [(time - KINK_SPAN_S, time + KINK_SPAN_S) for time in kinks]
-    halt = tap.stroke_m / tap.velocity_m_s
-    edges = [halt] if math.isfinite(halt) else []
-    pressed = required(features.force).after_contact()
-    force = average_blocks(pressed, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
-    jumps = [event.time_s for event in motion.events if event.kind is TapEventKind.CONTACT]
-    if jumps or edges:
-        factors = _std_factors_at_jumps(force.time_s, jumps, 2.0 * FINE_FORCE_BLOCK_S)
-        factors *= _std_factors_at_jumps(force.time_s, edges, AT_THE_HALT_S)
-        force = replace(force, std=force.std * factors)
-    position = average_blocks(required(features.position), POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
-    return LinearisedModel(plant, tap, force, position)
 
 
 @compiled
@@ -236,23 +200,24 @@ def _linearise(
     beyond : float
         How far to continue along ln(mu_k/mu_s).
     """
-    split, size = len(force) // (PARAMETERS + 1), len(values)
-    residual, derivative = np.empty(size), np.empty(PARAMETERS)
-    normal, slope = np.zeros((PARAMETERS, PARAMETERS)), np.zeros(PARAMETERS)
+    count, size = len(steps), len(values)
+    split = len(force) // (count + 1)
+    residual, derivative = np.empty(size), np.empty(count)
+    normal, slope = np.zeros((count, count)), np.zeros(count)
     chi2 = 0.0
     for i in range(size):
         model, row, blocks = (force, i, split) if i < split else (position, i - split, size - split)
         modelled = model[row]
-        for k in range(PARAMETERS):
+        for k in range(count):
             derivative[k] = (modelled - model[(k + 1) * blocks + row]) * weights[i] / steps[k]
         scaled = (values[i] - modelled) * weights[i] + derivative[RATIO] * beyond
         residual[i] = scaled
         chi2 += scaled * scaled
-        for k in range(PARAMETERS):
+        for k in range(count):
             slope[k] += derivative[k] * scaled
             for m in range(k + 1):
                 normal[k, m] += derivative[k] * derivative[m]
-    for k in range(PARAMETERS):
+    for k in range(count):
         for m in range(k):
             normal[m, k] = normal[k, m]
     return residual, normal, slope, chi2
@@ -288,11 +253,3 @@ def _sample_squares(
         total += residual[i] * residual[i] + within / noise_std**2
         counted += count[i]
     return total, counted
-
-
-def _std_factors_at_jumps(times: Samples, jumps: list[float], within_s: float) -> Samples:
-    """Factor that takes blocks about a jump out of the fit: their means depend on where in them it lies."""
-    factor = np.ones_like(times)
-    for jump in jumps:
-        factor[np.abs(times - jump) < within_s] = 1e3
-    return factor

@@ -23,12 +23,15 @@ class PlantFit:
         RMS of all residuals in blocks, 1 = noise.
     shared_error : float
         Relative standard deviation of mu_k/mu_s that all taps share; 0 takes each tap's own for all of it.
+    onset_s : float
+        Mean moment of first contact of the taps whose recorder does not tell it, by their own times; else 0.
     """
 
     model: Model
     used: tuple[int, ...]
     gap: float
     shared_error: float = 0.0
+    onset_s: float = 0.0
 
     def estimate(self, tap: Features, model: Model) -> FrictionEstimate:
         """Estimate the friction of one of the taps that were fitted, by their model, calibrated or not.

@@ -10,7 +10,8 @@ from impactcell.prediction import gauss_newton
 from impactcell.prediction.gauss_newton import Step, StopRule
 from impactcell.prediction.linearised_model import (
     JUST_STICKING,
-    PARAMETERS,
+    LATEST_ONSET,
+    ONSET,
     RATIO,
     Linearisation,
     LinearisedModel,
@@ -30,7 +31,7 @@ class GaussianPrior:
 
     Attributes
     ----------
-    mean, weight : ndarray, shape (4,)
+    mean, weight : ndarray, shape (p,)
     """
 
     mean: Samples
@@ -48,7 +49,7 @@ class Minimum:
 
     Attributes
     ----------
-    theta : ndarray, shape (4,)
+    theta : ndarray, shape (p,)
     side : int
     linear : Linearisation
     cost : float
@@ -106,16 +107,16 @@ def _solve_step(
 
     Returns
     -------
-    step : ndarray, shape (4,)
+    step : ndarray, shape (p,)
         To the quadratic's minimum where nothing is damped.
-    inverse : ndarray, shape (4, 4)
+    inverse : ndarray, shape (p, p)
         Of the damped curvature.
     length : float
         Of the step, in variances. Without damping also twice what the cost falls by.
     log_determinant : float
         Of the damped curvature; nan where it is not positive.
     """
-    size = PARAMETERS
+    size = len(slope)
     curvature, factor = np.empty((size, size)), np.zeros((size, size))
     gradient = np.empty(size)
     log_determinant = 0.0
@@ -190,7 +191,9 @@ class TapProblem:
             linear.normal, linear.slope, prior.weight, start.theta - prior.mean, 1.0, damping
         )
         longest = np.minimum(MAX_STEP, MAX_STEP_STD / np.maximum(prior.weight, 1e-12))
-        return Step(start.theta + np.minimum(np.maximum(step, -longest), longest), length, covariance)
+        theta = start.theta + np.minimum(np.maximum(step, -longest), longest)
+        theta[ONSET:] = np.minimum(np.maximum(theta[ONSET:], -LATEST_ONSET), LATEST_ONSET)
+        return Step(theta, length, covariance)
 
     def noise(self, at: Minimum) -> float:
         """Mean square of the residuals, no less than that of noise."""

@@ -1,6 +1,6 @@
 """mu_s and mu_k from the whole waveform of a tap: maximum a posteriori, with k and b as nuisances.
 
-Gauss-Newton on the blocks of a capture (`linearised_model`), started from the curvature of
+Gauss-Newton on the blocks of a capture (`capture_blocks`), started from the curvature of
 the slide. Priors are those of the model: mu_k is free; mu_k/mu_s, k and b are log-normal about its plant's.
 Where breakaway may be immediate the posterior has a kink and is fitted on either side of it
 (`impactcell.prediction.posterior`): mu_s is then seen only through the prior on mu_k/mu_s, and its
@@ -16,11 +16,11 @@ from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
 from impactcell.features import Features, SlideFeatures, required
 from impactcell.features.contact import refuse_clipped
 from impactcell.physics import Plant
+from impactcell.prediction.capture_blocks import linearised_model
 from impactcell.prediction.linearised_model import (
     MU_K,
     PARAMETERS,
     LinearisedModel,
-    linearised_model,
     parameters_of,
     with_parameters,
 )
@@ -55,8 +55,8 @@ class WaveformFit:
     ----------
     mu_s, mu_s_std, mu_k, mu_k_std : float
         Posterior means and standard deviations.
-    theta : ndarray, shape (4,)
-        Most probable ln(mu_k, mu_k/mu_s, k, b).
+    theta : ndarray, shape (4,) or (5,)
+        Most probable ln(mu_k, mu_k/mu_s, k, b), and first contact where it is not told.
     posterior : Posterior
         Of theta.
     immediate : float
@@ -79,8 +79,8 @@ class WaveformFit:
     misfit: float
 
 
-def prior_of(model: Model) -> GaussianPrior:
-    """Prior of a tap's parameters; nothing is known of mu_k."""
+def prior_of(model: Model, parameters: int = PARAMETERS) -> GaussianPrior:
+    """Prior of a tap's parameters, with its first contact where that is one; nothing is known of mu_k."""
     plant, prior = model.plant, model.prior
     weight = np.array(
         [
@@ -90,7 +90,10 @@ def prior_of(model: Model) -> GaussianPrior:
             plant.damping_n_s_per_m / prior.damping_std_n_s_per_m,
         ]
     )
-    return GaussianPrior(parameters_of(plant), weight)
+    beyond = parameters - PARAMETERS
+    return GaussianPrior(
+        np.append(parameters_of(plant), np.zeros(beyond)), np.append(weight, np.ones(beyond))
+    )
 
 
 def fit(features: Features, model: Model) -> WaveformFit:
@@ -112,7 +115,7 @@ def fit(features: Features, model: Model) -> WaveformFit:
     """
     refuse_clipped(required(features.force))
     slide, capture = required(features.slide), features.capture
-    prior = prior_of(model)
+    prior = prior_of(model, PARAMETERS + (capture.onset_std_s > 0.0))
     theta = prior.mean.copy()
     theta[MU_K] = math.log(max(deceleration_friction(model, capture.mass_kg, slide), 1e-3))
     if not (capture.mass_kg > 0.0 and capture.velocity_m_s > 0.0):
@@ -127,7 +130,8 @@ def fit(features: Features, model: Model) -> WaveformFit:
 
 def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples) -> WaveformFit:
     response = linearised_model(features, with_parameters(plant, start))
-    offset = response.kink_coordinate(start) - float(KINK_FORM @ start)
+    kink_form = _over(KINK_FORM, response.parameters)
+    offset = response.kink_coordinate(start) - float(kink_form @ start)
     fits = _fit_both_sides(response, prior, start)
     plain, misfit = _likelier_side(fits, prior, offset)
     if misfit > MISFIT_THRESHOLD:  # perhaps only because the start had its kinks elsewhere
@@ -153,7 +157,7 @@ def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples)
     sides = tuple(minimum.truncated(prior, widening) for minimum in fits)
     if len(sides) == 1:
         sides = (replace(sides[0], sign=0),)
-    posterior = mixture(sides, KINK_FORM, offset)
+    posterior = mixture(sides, kink_form, offset)
     slips_at_once = [minimum.side < 0 for minimum in fits]
     (mu_s, mu_s_std), (mu_k, mu_k_std) = (_log_normal_moments(posterior, of) for of in (MU_S_FORM, MU_K_FORM))
     return WaveformFit(
@@ -173,20 +177,29 @@ def _fit_both_sides(response: LinearisedModel, prior: GaussianPrior, start: Samp
     """Descend on the side of the start, and on the other where the kink is near."""
     side = 1 if response.kink_coordinate(start) >= 0.0 else -1
     minimum = TapProblem(response, prior, side).fit(start)
-    spread = math.sqrt(float(KINK_FORM @ minimum.truncated(prior).covariance @ KINK_FORM))
+    form = _over(KINK_FORM, response.parameters)
+    spread = math.sqrt(float(form @ minimum.truncated(prior).covariance @ form))
     if side * response.kink_coordinate(minimum.theta) >= KINK_DISTANCE_STD * spread:
         return [minimum]
     return [minimum, TapProblem(response, prior, -side).fit(minimum.theta)]
 
 
+def _over(form: Samples, parameters: int) -> Samples:
+    """Give a linear form over all of theta: nothing of it follows first contact."""
+    return form if len(form) == parameters else np.pad(form, (0, parameters - len(form)))
+
+
 def _likelier_side(fits: list[Minimum], prior: GaussianPrior, offset: float) -> tuple[Minimum, float]:
     """Side with the greater probability, and its misfit; the lower minimum may lie beyond its side's end."""
-    freedom = max(len(fits[0].residual) - PARAMETERS, 1)
+    parameters = len(fits[0].theta)
+    freedom = max(len(fits[0].residual) - parameters, 1)
     misfit = math.sqrt(min(minimum.chi2 for minimum in fits) / freedom)
     if len(fits) == 1:
         return fits[0], misfit
     weights = mixture(
-        tuple(minimum.truncated(prior, max(misfit, 1.0)) for minimum in fits), KINK_FORM, offset
+        tuple(minimum.truncated(prior, max(misfit, 1.0)) for minimum in fits),
+        _over(KINK_FORM, parameters),
+        offset,
     ).weights
     best = fits[int(np.argmax(weights))]
     return best, math.sqrt(best.chi2 / freedom)
@@ -194,7 +207,7 @@ def _likelier_side(fits: list[Minimum], prior: GaussianPrior, offset: float) -> 
 
 def _log_normal_moments(posterior: Posterior, of: Samples) -> tuple[float, float]:
     """Mean and standard deviation of exp(`of` @ theta)."""
-    mean, std = posterior.moments(of)
+    mean, std = posterior.moments(_over(of, len(posterior.form)))
     value = math.exp(mean + 0.5 * std * std)
     return value, value * math.sqrt(math.expm1(std * std))
 

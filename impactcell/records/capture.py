@@ -85,6 +85,8 @@ class Capture:
         Any further numeric or text column of a campaign.
     summary : Summary or None
         The module's own figures for this cycle, where it reports them.
+    onset_std_s : float
+        Standard deviation of the moment of first contact about t = 0 [s]; 0 where the recorder tells it.
     """
 
     cycle: int
@@ -102,6 +104,7 @@ class Capture:
     session: int = 0
     covariates: Mapping[str, float | str] = field(default_factory=dict)
     summary: "Summary | None" = None
+    onset_std_s: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

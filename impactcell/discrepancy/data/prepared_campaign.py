@@ -79,7 +79,6 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         Too few shots for any test, or a unit that is wrong by a large factor.
     """
     strategy = STRATEGIES[campaign.excitation]
-    recorded = {shot.cycle: shot for shot in campaign.shots}
     whole = campaign
     campaign, pretrigger = from_contact(whole)
     data_faults = inspect_campaign(campaign)
@@ -100,8 +99,7 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         group = groups.setdefault(key, len(groups))
         batch = batches.index(capture.batch_id or "")
         shot = _prepared_shot(strategy, capture, (record, len(campaign.shots)), batch, group)
-        begun_before = campaign.excitation is Excitation.TAP and capture is not recorded[capture.cycle]
-        shots.append(_with_open_onset(shot) if begun_before else shot)
+        shots.append(_with_open_onset(shot) if capture.onset_std_s else shot)
     notes += strategy.missing_information(shots)
     notes += _time_gaps(shots)
     _check_units(campaign, shots)

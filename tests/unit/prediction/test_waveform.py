@@ -11,7 +11,8 @@ from impactcell.errors import CaptureError, ClippedForceError, NoSeparationError
 from impactcell.features import extract, noise_std
 from impactcell.physics import Plant, simulate_tap
 from impactcell.prediction import Model, Prior
-from impactcell.prediction.linearised_model import tap_input, with_parameters
+from impactcell.prediction.capture_blocks import tap_input
+from impactcell.prediction.linearised_model import with_parameters
 from impactcell.prediction.waveform import fit
 from impactcell.records import Channel
 from tests.posterior_intervals import friction_intervals

@@ -1,0 +1,88 @@
+"""A capture in blocks, fine where the model has its kinks, beside the model that should reproduce them."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from impactcell.features import CheckedChannel, Features, required
+from impactcell.physics import Plant, TapEventKind, TapInput, simulate_tap
+from impactcell.prediction.block_averaging import (
+    FINE_FORCE_BLOCK_S,
+    FINE_POSITION_BLOCK_S,
+    FORCE_BLOCK_S,
+    POSITION_BLOCK_S,
+    average_blocks,
+)
+from impactcell.prediction.linearised_model import LATEST_ONSET, LinearisedModel
+from impactcell.records import Capture, Samples
+
+KINK_SPAN_S = 1.5e-4
+"""How far to either side of an event of the start, s, blocks are short: the fit has its event there. With
+half of it, twice and four times the errors of mu_s are the same to 1e-3 of themselves."""
+
+AT_THE_HALT_S = 1e-9
+"""A sample this near to the actuator's halt, s, is of before or after it by rounding alone: modules give
+times in whole ns."""
+
+
+def tap_input(capture: Capture) -> TapInput:
+    """Turn a capture's command into a tap for the model; without a stroke the actuator halts by itself."""
+    return TapInput(
+        velocity_m_s=capture.velocity_m_s,
+        mass_kg=capture.mass_kg,
+        stroke_m=capture.stroke_m,
+        direction=capture.direction,
+        halts_at_separation=math.isinf(capture.stroke_m),
+        start_m=capture.start_m,
+        dwell_s=capture.dwell_s,
+    )
+
+
+def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
+    """Average a capture over blocks, fine where `plant` has its events and contact was lost.
+
+    Parameters
+    ----------
+    features : Features
+        Of a capture with force, position, a mass and a velocity.
+    plant : Plant
+        Near enough for its events to tell where the kinks are.
+
+    Raises
+    ------
+    PredictionError, PhysicsError
+        The capture does not show its slide, or the plant has no motion.
+    """
+    tap, onset_std_s = tap_input(features.capture), features.capture.onset_std_s
+    motion = simulate_tap(plant, tap)
+    kinks = [*(event.time_s for event in motion.events), required(features.separation).value]
+    spans = [(time - KINK_SPAN_S, time + KINK_SPAN_S) for time in kinks]
+    halt = tap.stroke_m / tap.velocity_m_s
+    edges = [halt] if math.isfinite(halt) else []
+    pressed = _surely_touching(required(features.force).after_contact(), onset_std_s)
+    force = average_blocks(pressed, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
+    jumps = [event.time_s for event in motion.events if event.kind is TapEventKind.CONTACT]
+    if jumps or edges:
+        factors = _std_factors_at_jumps(force.time_s, jumps, 2.0 * FINE_FORCE_BLOCK_S)
+        factors *= _std_factors_at_jumps(force.time_s, edges, AT_THE_HALT_S)
+        force = replace(force, std=force.std * factors)
+    moved = _surely_touching(required(features.position), onset_std_s)
+    position = average_blocks(moved, POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
+    return LinearisedModel(plant, tap, force, position, onset_std_s)
+
+
+def _surely_touching(channel: CheckedChannel, onset_std_s: float) -> CheckedChannel:
+    """Leave out the samples that may lie before first contact."""
+    if not onset_std_s:
+        return channel
+    since = channel.time_s > LATEST_ONSET * onset_std_s
+    return replace(channel, time_s=channel.time_s[since], values=channel.values[since])
+
+
+def _std_factors_at_jumps(times: Samples, jumps: list[float], within_s: float) -> Samples:
+    """Factor that takes blocks about a jump out of the fit: their means depend on where in them it lies."""
+    factor = np.ones_like(times)
+    for jump in jumps:
+        factor[np.abs(times - jump) < within_s] = 1e3
+    return factor
