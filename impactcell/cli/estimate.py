@@ -16,8 +16,8 @@ from impactcell.discrepancy.data import check_campaign_units
 from impactcell.errors import CampaignError, PredictionError
 from impactcell.features import Features, extract
 from impactcell.prediction import Model, estimate_from_features
+from impactcell.prediction.contact_onset import fit_plant_and_onset, onset_sentence
 from impactcell.prediction.free_slide_friction import free_slide_friction
-from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.process.console import print_note, print_result
 from impactcell.process.progress import progress
 from impactcell.process.whole_files import write_whole
@@ -107,14 +107,13 @@ def _of_taps(
         plant = read_cell(cell).model
     else:
         with progress("fitting the plant", 1):
-            fitted = fit_plant(taps, campaign.gravity_m_s2)
+            told = sum(tap.capture.onset_std_s == 0.0 for tap in taps)
+            fitted, taps = fit_plant_and_onset(taps, campaign.gravity_m_s2)
         plant, estimate_of = fitted.model, fitted.estimate
-        begun_before = sum(tap.capture.onset_std_s > 0.0 for tap in taps)
-        if begun_before:
-            print_note(
-                f"contact of {begun_before} shots is fitted with them, within a sampling step: on average "
-                f"{1e6 * fitted.onset_s:+.3g} µs from where their force begins"
-            )
+        if told < len(taps):
+            print_note(f"contact of {len(taps) - told} shots is fitted with them, within a sampling step")
+        elif fitted.onset_s:
+            print_note(f"{onset_sentence(fitted.onset_s)}; it is fitted with each shot")
         print_note(
             f"plant fitted to {len(fitted.used)} of {len(taps)} shots: {fitted.sentence}; "
             f"residuals {fitted.gap:.3g} times the noise"

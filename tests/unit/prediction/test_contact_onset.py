@@ -1,0 +1,68 @@
+"""Contact that lies elsewhere than recorders say. Truth: the simulator's own plant."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from impactcell.api.first_model import fit_first_model
+from impactcell.campaign.recorded_campaign import from_captures
+from impactcell.features import extract
+from impactcell.prediction.contact_onset import fit_plant_and_onset
+from impactcell.records import Capture, Channel
+from tests.taps import Tap
+
+
+def triggered(
+    late_s: float, effects: dict[str, dict[str, float]] | None = None
+) -> tuple[list[Capture], list[float]]:
+    """Taps of a module whose t = 0 comes after first contact, and their mu_s."""
+    rng = np.random.default_rng(3)
+    taps, frictions = [], []
+    for cycle in range(1, 17):
+        frictions.append(float(rng.uniform(0.15, 0.25)))
+        tap = Tap(
+            float(rng.uniform(0.033, 0.1)), frictions[-1], mass_kg=float(rng.choice([10.0, 18.9, 30.0])),
+            stroke_m=2e-3, effects=effects or {},
+        ).capture(rng, force_hz=1e5, cycle=cycle)  # fmt: skip
+
+        def counted(channel: Channel | None) -> Channel:
+            assert channel is not None
+            kept = channel.time_s > late_s
+            return replace(channel, time_s=channel.time_s[kept] - late_s, values=channel.values[kept])
+
+        taps.append(replace(tap, force=counted(tap.force), position=counted(tap.position)))
+    return taps, frictions
+
+
+@pytest.mark.parametrize("late_s", [5e-6, 2e-5, 5e-5])
+def test_a_trigger_that_is_late_is_found_and_bends_no_friction(late_s: float) -> None:
+    """Fitted as contact at t = 0, ten of 24 had mu_s off by up to 110 %, status good."""
+    taps, frictions = triggered(late_s)
+    fit, used = fit_plant_and_onset([extract(tap) for tap in taps], 9.81)
+    assert fit.onset_s == pytest.approx(-late_s, abs=1e-6)
+    assert fit.gap < 1.03
+    said = [fit.estimate(tap, fit.model).mu_s for tap in used]
+    pulls = [(one.value - mu_s) / one.std for one, mu_s in zip(said, frictions, strict=True)]
+    assert max(abs(one.value / mu_s - 1.0) for one, mu_s in zip(said, frictions, strict=True)) < 0.01
+    assert math.sqrt(np.mean(np.square(pulls))) < 1.5
+
+
+@pytest.mark.parametrize("effects", [{}, {"quadratic_drag": {"drag_coefficient_n_s2_per_m2": 45.0}}])
+def test_contact_stays_where_it_is_said_to_be_if_that_is_not_what_is_wrong(
+    effects: dict[str, dict[str, float]],
+) -> None:
+    fit, used = fit_plant_and_onset(given := [extract(tap) for tap in triggered(0.0, effects)[0]], 9.81)
+    assert fit.onset_s == 0.0
+    assert used is given
+
+
+def test_a_first_model_asks_for_an_earlier_trigger() -> None:
+    taps, _ = triggered(2e-5)
+    found = fit_first_model(from_captures(taps, 9.81).campaign, "press-1", "journal")
+    (said,) = [text for text in found.shortcomings if "first contact" in text]
+    assert said.startswith("first contact lies 20 µs before t = 0 in these taps")
+    assert "trigger" in said
+    right = fit_first_model(from_captures(triggered(0.0)[0], 9.81).campaign, "press-1", "journal")
+    assert not [text for text in right.shortcomings if "first contact" in text]
