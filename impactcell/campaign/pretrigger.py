@@ -7,7 +7,7 @@ import numpy as np
 
 from impactcell.campaign import contacts
 from impactcell.campaign.contents import Campaign, Excitation
-from impactcell.records import Capture, Channel, since_contact
+from impactcell.records import Capture, Channel, since_contact, with_open_onset
 
 FEWEST_SAMPLES = 10
 """Samples of force below which no contact is looked for: a baseline and a rise want as many."""
@@ -21,9 +21,6 @@ MIN_LATE_STEPS = 3.0
 """Sampling steps by which a contact has to come late before a record is taken to have begun earlier."""
 MIN_LATE_S = 1e-3
 """Time by which it has to come late: longer than a sensor lags or a channel is skewed."""
-ONSET_STD = 0.5
-"""Standard deviation of contact about t = 0, in sampling steps, where a record began before it:
-its first sample may lie anywhere within one, and where a soft contact shows is off by as much again."""
 STATED_LATE_S = 5e-3
 """The same where samples before t = 0 say that t = 0 was meant to be the contact."""
 
@@ -49,18 +46,10 @@ def from_contact(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     if changed:
         notes.append(f"Samples before contact (pretrigger) of {changed} shots are left out of the fits.")
     counted = tuple(
-        after if after is before else _with_open_onset(after)
+        after if after is before else with_open_onset(after)
         for before, after in zip(campaign.shots, kept, strict=True)
     )
     return replace(campaign, shots=counted), tuple(notes)
-
-
-def _with_open_onset(shot: Capture) -> Capture:
-    """Say how well contact is known of a record that shows it by its samples only: to a sampling step."""
-    channels = (shot.force, shot.position, shot.actuator)
-    times = next((one.time_s for one in channels if one is not None and len(one.time_s) > 1), None)
-    step_s = 0.0 if times is None else float(np.median(np.diff(times)))
-    return replace(shot, onset_std_s=ONSET_STD * step_s)
 
 
 def _late_onset(force: Channel | None) -> int | None:

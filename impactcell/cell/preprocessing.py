@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-from impactcell.records import BatchAnnouncement, Capture, Channel, FrictionEstimate, Quality
+from impactcell.records import BatchAnnouncement, Capture, Channel, FrictionEstimate, Quality, with_open_onset
 
 PERIOD_GAIN = 0.05
 """Share of the latest time between cycles in their mean."""
@@ -58,14 +58,14 @@ class CycleBatch:
 
 
 def fill_defaults(defaults: CaptureDefaults, capture: Capture) -> Capture:
-    """Fill in what the module does not report: mass, stroke and the noise of its sensors."""
+    """Fill in what the module does not report: mass, stroke, noise; contact, which it sees to a sample."""
     mass_kg, stroke_m = capture.mass_kg, capture.stroke_m
     if math.isnan(mass_kg) and defaults.mass_kg is not None:
         mass_kg = defaults.mass_kg
     if math.isinf(stroke_m) and defaults.stroke_m is not None:
         stroke_m = defaults.stroke_m
     return replace(
-        capture,
+        with_open_onset(capture),
         mass_kg=mass_kg,
         stroke_m=stroke_m,
         force=_with_noise(capture.force, defaults.force_noise_std_n),

@@ -5,7 +5,15 @@ from it; a `Snapshot` holds them together for one cycle and is what is published
 """
 
 from impactcell.records.alarm import Alarm, Evidence, Shelving
-from impactcell.records.capture import Capture, Channel, Samples, Summary, since_contact, uniform_times
+from impactcell.records.capture import (
+    Capture,
+    Channel,
+    Samples,
+    Summary,
+    since_contact,
+    uniform_times,
+    with_open_onset,
+)
 from impactcell.records.friction import (
     BatchState,
     Coefficient,
@@ -41,4 +49,5 @@ __all__ = [
     "WearState",
     "since_contact",
     "uniform_times",
+    "with_open_onset",
 ]

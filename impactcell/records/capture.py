@@ -1,7 +1,7 @@
 """What a module measured in one cycle."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,11 @@ Samples = NDArray[np.float64]
 
 FIRST_CONTACT_S = 1e-9
 """Time [s] up to which a sample is taken at first contact itself: modules give times in whole ns."""
+ONSET_STD = 0.5
+"""Standard deviation of first contact about t = 0, in sampling steps, where a recorder sees it in samples: it
+may lie anywhere within one, and where a soft contact shows is off by as much again."""
+STEPS_LOOKED_AT = 50
+"""Samples whose median distance is the sampling step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,3 +123,14 @@ class Summary:
     sliding_distance_m: float
     peak_force_std_n: float = float("nan")
     sliding_distance_std_m: float = float("nan")
+
+
+def with_open_onset(capture: Capture) -> Capture:
+    """Say that first contact is known to a sampling step, as of a recorder that sees it in its samples.
+
+    The step is that of the force, of another channel where there is none.
+    """
+    channels = (capture.force, capture.position, capture.actuator)
+    times = next((one.time_s for one in channels if one is not None and len(one.time_s) > 1), None)
+    step_s = 0.0 if times is None else float(np.median(np.diff(times[:STEPS_LOOKED_AT])))
+    return replace(capture, onset_std_s=ONSET_STD * step_s)

@@ -8,7 +8,7 @@ import pytest
 
 from impactcell import cell as core
 from impactcell.cell import CellDesign
-from impactcell.records import PositioningState
+from impactcell.records import Channel, PositioningState, Quality
 from impactcell.service.factory import cell_design
 from impactcell.settings import read_cell
 from tests.integration.processes import CONFIG
@@ -48,9 +48,33 @@ def test_an_effect_that_the_model_knows_makes_no_cycle_deviant(seed: int) -> Non
     assert deviant_cycles(design, seed, 90) == []
 
 
-@pytest.mark.parametrize("seed", [6, 8])
+@pytest.mark.parametrize("seed", [6, 9])
 def test_an_effect_of_every_cycle_is_soon_how_cycles_vary(seed: int) -> None:
     """The model has not taken it over: slow cycles deviate, others between them do not."""
     found = deviant_cycles(cell_design(read_cell(CONFIG / "cells" / "new-effect.yaml")), seed, 160)
     assert 5 < len(found) < 15
     assert found[-1] < 120
+
+
+def test_contact_between_two_samples_of_a_module_bends_no_friction() -> None:
+    """At 100 kHz it lies up to 10 µs before t = 0: mu_s of light parts was 15 standard deviations off."""
+    design = cell_design(read_cell(CONFIG / "cells" / "new-effect.yaml"))
+    draw, state, pulls = np.random.default_rng(3), core.initial_state(design), []
+    for cycle in range(1, 25):
+        mu_s, late_s = float(draw.uniform(0.15, 0.25)), 1e-5 * draw.uniform()
+
+        def counted(channel: Channel | None, late_s: float = late_s) -> Channel:
+            assert channel is not None
+            kept = channel.time_s > late_s
+            return replace(channel, time_s=channel.time_s[kept] - late_s, values=channel.values[kept])
+
+        mass_kg = float(draw.choice([8.0, 12.6, 25.2]))
+        tap = Tap(float(draw.uniform(0.035, 0.09)), mu_s, mass_kg=mass_kg, stroke_m=1.5e-3)
+        seen = tap.capture(draw, force_hz=1e5, cycle=cycle)
+        seen = replace(seen, force=counted(seen.force), position=counted(seen.position))
+        stepped = core.step(design, state, seen, PositioningState(), None, ())
+        state, found = stepped.state, stepped.snapshot.friction.mu_s
+        if found.quality is Quality.GOOD:
+            pulls.append((found.value - mu_s) / found.std)
+    assert len(pulls) > 12
+    assert float(np.abs(pulls).max()) < 4.0

@@ -111,6 +111,7 @@ def test_what_the_module_leaves_out_is_filled_in_and_what_it_says_stays() -> Non
     assert filled.actuator is not None
     assert (filled.force.noise_std, filled.position.noise_std) == (0.3, 2e-6)
     assert filled.actuator.noise_std is None
+    assert filled.onset_std_s == 0.5  # half of the force's sampling step
     said = replace(
         silent,
         mass_kg=18.9,
@@ -125,6 +126,7 @@ def test_what_the_module_leaves_out_is_filled_in_and_what_it_says_stays() -> Non
     nothing = fill_defaults(CaptureDefaults(), replace(silent, force=None, position=None))
     assert math.isnan(nothing.mass_kg)
     assert (nothing.stroke_m, nothing.force, nothing.position) == (math.inf, None, None)
+    assert fill_defaults(CaptureDefaults(), replace(nothing, actuator=None)).onset_std_s == 0.0
 
 
 def test_faults_make_an_estimate_uncertain_and_say_why() -> None:
