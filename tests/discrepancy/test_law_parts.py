@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from impactcell.discrepancy.data.phases import PHASES
-from impactcell.discrepancy.laws import covariates, finding, grammar
-from impactcell.discrepancy.laws.law import LawParameter
+from impactcell.discrepancy.laws import covariates, finding, grammar, refit
+from impactcell.discrepancy.laws.condense import RankedForm
+from impactcell.discrepancy.laws.grammar import Shaped
+from impactcell.discrepancy.laws.law import LawParameter, write_law
 from impactcell.physics.free_forms import FREE_FORMS
 
 
@@ -87,3 +89,17 @@ def test_a_value_past_the_end_of_its_range_by_rounding_begins_at_the_end() -> No
     assert scale.starting_at(np.nextafter(scale.lower, 0.0)).first == scale.lower
     assert scale.starting_at(1.0 + 1e-15).first == scale.upper
     assert scale.starting_at(0.3).first == 0.3
+
+
+def test_a_wave_has_no_parts_to_be_tried_alone() -> None:
+    """Its two terms share one period: taken apart as a sum, the search ended in a traceback."""
+    place = next(form for form in FREE_FORMS.values() if form.covariate == "position")
+    terms = tuple(Shaped((atom,), ((0.004,),)) for atom in grammar.WAVE_ATOMS)
+    ranked = RankedForm(terms, (0.02, 0.01), 50.0, 40.0, np.zeros(2))
+    law = write_law(place, ranked, ((0.0, 0.02),))
+    assert law.is_wave
+    coordinates = [SimpleNamespace(value=lambda number: number) for _ in law.parameters]
+    fit = SimpleNamespace(coordinates=coordinates, theta=np.array([one.first for one in law.parameters]))
+    fitted: Any = SimpleNamespace(law=law, ranked=ranked, fit=fit)
+    nothing: Any = None
+    assert refit._parts_alone(nothing, fitted) == []

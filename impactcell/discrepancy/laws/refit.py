@@ -103,8 +103,11 @@ def _parts_alone(term: FreeTerm, fitted: FittedLaw) -> list[RankedForm]:
     """Take each part of a law alone, from where the whole came to rest.
 
     Of a sum each term: the plant may take up the other one. Of a product of functions of two covariates each
-    function: the other one may have come to rest where it is constant.
+    function: the other one may have come to rest where it is constant. A wave, whose terms share its period,
+    has no parts.
     """
+    if fitted.law.is_wave:
+        return []
     of_law = len(fitted.law.parameters)
     pairs = zip(fitted.fit.coordinates[-of_law:], fitted.fit.theta[-of_law:].tolist(), strict=True)
     values = iter([coordinate.value(number) for coordinate, number in pairs])
@@ -123,7 +126,7 @@ def _parts_alone(term: FreeTerm, fitted: FittedLaw) -> list[RankedForm]:
         others = _taken_up(term, fitted, constant)[:-of_law]
         return RankedForm((kept,), (amplitude,), -math.inf, -math.inf, others)
 
-    if len(shaped) == 2 and not fitted.law.is_wave:
+    if len(shaped) == 2:
         return [
             alone(kept, amplitude, other * mean(dropped))
             for (amplitude, kept), (other, dropped) in (shaped, shaped[::-1])
