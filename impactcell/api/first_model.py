@@ -10,7 +10,7 @@ from impactcell.api.friction import with_masses
 from impactcell.campaign import Campaign, Excitation, from_contact
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
 from impactcell.features import Features, extract, impulse_balance
-from impactcell.prediction.contact_onset import fit_plant_and_onset, onset_sentence
+from impactcell.prediction.contact_onset import fit_plant_and_onset, is_late, onset_sentence
 from impactcell.prediction.plant_fit import PlantFit
 from impactcell.process.console import print_note
 
@@ -73,7 +73,7 @@ def fit_first_model(campaign: Campaign, name: str, source: str) -> FirstModel:
     taps = with_masses([extract(shot) for shot in struck.shots])
     doubt = _common_doubt(taps)
     try:
-        fit, _ = fit_plant_and_onset(_with_one_contact(taps), struck.gravity_m_s2, name)
+        fit, used = fit_plant_and_onset(_with_one_contact(taps), struck.gravity_m_s2, name)
     except (PredictionError, PhysicsError) as fault:
         if not doubt:
             raise
@@ -81,7 +81,7 @@ def fit_first_model(campaign: Campaign, name: str, source: str) -> FirstModel:
     provenance = {"made by": "impactcell", "fitted to": f"{len(fit.used)} taps of {source}"}
     fit = replace(fit, model=replace(fit.model, provenance=provenance))
     shortcomings = _shortcomings(fit, float(np.median([t.capture.mass_kg for t in taps])))
-    if not any(shot.onset_std_s for shot in struck.shots) and fit.onset_s:
+    if is_late(fit, used):
         shortcomings.append(
             f"{onset_sentence(fit.onset_s)}: cells take it there, which bends mu_s; let the module count its "
             "times from first contact, as by a lower threshold of its trigger, and strike again"

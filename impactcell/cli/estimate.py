@@ -16,13 +16,13 @@ from impactcell.discrepancy.data import check_campaign_units
 from impactcell.errors import CampaignError, PredictionError
 from impactcell.features import Features, extract
 from impactcell.prediction import Model, estimate_from_features
-from impactcell.prediction.contact_onset import fit_plant_and_onset, onset_sentence
+from impactcell.prediction.contact_onset import fit_plant_and_onset, is_late, onset_sentence
 from impactcell.prediction.free_slide_friction import free_slide_friction
 from impactcell.process.console import print_note, print_result
 from impactcell.process.progress import progress
 from impactcell.process.whole_files import write_whole
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
-from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate
+from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, with_open_onset
 
 COLUMNS = (
     "shot", "mu_s_force", "mu_s_distance", "mu_s_combined", "mu_s", "mu_s_std", "mu_k", "mu_k_std",
@@ -75,7 +75,7 @@ def estimate(
             (shot.cycle, _of_free_slide(shot, campaign_data.gravity_m_s2)) for shot in campaign_data.shots
         ]
     else:
-        taps = with_masses([extract(shot) for shot in campaign_data.shots])
+        taps = with_masses([extract(with_open_onset(shot)) for shot in campaign_data.shots])
         rows = _of_taps(campaign_data, taps, cell)
     if as_json:
         sys.stdout.write(_as_json(rows))
@@ -107,12 +107,9 @@ def _of_taps(
         plant = read_cell(cell).model
     else:
         with progress("fitting the plant", 1):
-            told = sum(tap.capture.onset_std_s == 0.0 for tap in taps)
             fitted, taps = fit_plant_and_onset(taps, campaign.gravity_m_s2)
         plant, estimate_of = fitted.model, fitted.estimate
-        if told < len(taps):
-            print_note(f"contact of {len(taps) - told} shots is fitted with them, within a sampling step")
-        elif fitted.onset_s:
+        if is_late(fitted, taps):
             print_note(f"{onset_sentence(fitted.onset_s)}; it is fitted with each shot")
         print_note(
             f"plant fitted to {len(fitted.used)} of {len(taps)} shots: {fitted.sentence}; "

@@ -125,12 +125,14 @@ class Summary:
     sliding_distance_std_m: float = float("nan")
 
 
-def with_open_onset(capture: Capture) -> Capture:
-    """Say that first contact is known to a sampling step, as of a recorder that sees it in its samples.
-
-    The step is that of the force, of another channel where there is none.
-    """
+def sampling_step_s(capture: Capture) -> float:
+    """Give the sampling step of the force, of another channel where there is none; 0 of no samples."""
     channels = (capture.force, capture.position, capture.actuator)
     times = next((one.time_s for one in channels if one is not None and len(one.time_s) > 1), None)
-    step_s = 0.0 if times is None else float(np.median(np.diff(times[:STEPS_LOOKED_AT])))
-    return replace(capture, onset_std_s=ONSET_STD * step_s)
+    return 0.0 if times is None else float(np.median(np.diff(times[:STEPS_LOOKED_AT])))
+
+
+def with_open_onset(capture: Capture) -> Capture:
+    """Say that first contact is known to a sampling step, as of a recorder that sees it in its samples."""
+    std_s = ONSET_STD * sampling_step_s(capture)
+    return capture if capture.onset_std_s >= std_s else replace(capture, onset_std_s=std_s)

@@ -126,7 +126,8 @@ def test_what_the_module_leaves_out_is_filled_in_and_what_it_says_stays() -> Non
     nothing = fill_defaults(CaptureDefaults(), replace(silent, force=None, position=None))
     assert math.isnan(nothing.mass_kg)
     assert (nothing.stroke_m, nothing.force, nothing.position) == (math.inf, None, None)
-    assert fill_defaults(CaptureDefaults(), replace(nothing, actuator=None)).onset_std_s == 0.0
+    unsampled = replace(silent, force=None, position=None, actuator=None)
+    assert fill_defaults(CaptureDefaults(), unsampled).onset_std_s == 0.0
 
 
 def test_faults_make_an_estimate_uncertain_and_say_why() -> None:

@@ -9,7 +9,7 @@ import pytest
 from impactcell.api.first_model import fit_first_model
 from impactcell.campaign.recorded_campaign import from_captures
 from impactcell.features import extract
-from impactcell.prediction.contact_onset import fit_plant_and_onset
+from impactcell.prediction.contact_onset import fit_plant_and_onset, is_late
 from impactcell.records import Capture, Channel
 from tests.taps import Tap
 
@@ -43,6 +43,7 @@ def test_a_trigger_that_is_late_is_found_and_bends_no_friction(late_s: float) ->
     fit, used = fit_plant_and_onset([extract(tap) for tap in taps], 9.81)
     assert fit.onset_s == pytest.approx(-late_s, abs=1e-6)
     assert fit.gap < 1.03
+    assert is_late(fit, used) is (late_s > 1e-5)
     said = [fit.estimate(tap, fit.model).mu_s for tap in used]
     pulls = [(one.value - mu_s) / one.std for one, mu_s in zip(said, frictions, strict=True)]
     assert max(abs(one.value / mu_s - 1.0) for one, mu_s in zip(said, frictions, strict=True)) < 0.01
@@ -53,9 +54,9 @@ def test_a_trigger_that_is_late_is_found_and_bends_no_friction(late_s: float) ->
 def test_contact_stays_where_it_is_said_to_be_if_that_is_not_what_is_wrong(
     effects: dict[str, dict[str, float]],
 ) -> None:
-    fit, used = fit_plant_and_onset(given := [extract(tap) for tap in triggered(0.0, effects)[0]], 9.81)
-    assert fit.onset_s == 0.0
-    assert used is given
+    fit, used = fit_plant_and_onset([extract(tap) for tap in triggered(0.0, effects)[0]], 9.81)
+    assert not is_late(fit, used)
+    assert [tap.capture.onset_std_s for tap in used] == pytest.approx([5e-6] * len(used))
 
 
 def test_a_first_model_asks_for_an_earlier_trigger() -> None:
