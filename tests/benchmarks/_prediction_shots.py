@@ -46,13 +46,20 @@ def motion(truth: Truth) -> simulated.Motion:
 
 
 def shot(
-    truth: Truth, rng: np.random.Generator, force_hz: float = RATE_HZ, position_hz: float = RATE_HZ
+    truth: Truth,
+    rng: np.random.Generator,
+    force_hz: float = RATE_HZ,
+    position_hz: float = RATE_HZ,
+    late_s: float = 0.0,
 ) -> Capture:
+    """Sample a shot; its t = 0 comes `late_s` after first contact."""
     moved = motion(truth)
     force_times = np.arange(1, round((moved.separation_s + 2e-3) * force_hz)) / force_hz
     position_times = np.arange(1, round((moved.stop_s + 2e-2) * position_hz)) / position_hz
-    force = moved.force_n(force_times) + rng.normal(0.0, FORCE_STD_N, len(force_times))
-    position = moved.position_m(position_times) + rng.normal(0.0, POSITION_STD_M, len(position_times))
+    force = moved.force_n(force_times + late_s) + rng.normal(0.0, FORCE_STD_N, len(force_times))
+    position = moved.position_m(position_times + late_s) + rng.normal(
+        0.0, POSITION_STD_M, len(position_times)
+    )
     return Capture(
         1, truth.velocity_m_s, MASS_KG,
         Channel(force_times, force, FORCE_STD_N), Channel(position_times, position, POSITION_STD_M),
