@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from impactcell.campaign import Excitation
 from impactcell.discrepancy.data import driven_blocks, measured_drive, prepared_campaign
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.measured_drive import SmoothedDrive, position_response, smooth_drive
@@ -123,13 +124,45 @@ def test_noise_at_rest_that_is_more_than_neighbours_show_is_told(
         whole, kept = (SimpleNamespace(values=part, noise_std=stated) for part in (values, values[200:]))
         recorded.append(SimpleNamespace(force=None, position=whole))
         counted.append(SimpleNamespace(force=None, position=kept))
-    campaigns: Any = (SimpleNamespace(shots=recorded), SimpleNamespace(shots=counted))
+    whole_campaign = SimpleNamespace(shots=recorded, excitation=Excitation.TAP)
+    campaigns: Any = (whole_campaign, SimpleNamespace(shots=counted))
     notes = correlated_noise(*campaigns)
     assert len(notes) == (correlation > 0.0 and stated is None)
     for note in notes:
         told = re.search(r"position scatters by (\S+) µm, .* State noise_std_m of sensors: position", note)
         assert told
         assert float(told[1]) == pytest.approx(1.5, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("noise", "told"),
+    [("white", None), ("correlated", 1.5), ("heavy", 1.5), ("moving", None), ("driven", None)],
+)
+def test_noise_after_the_tap_tells_where_nothing_was_recorded_before_it(
+    noise: str, told: float | None
+) -> None:
+    """The part slides for 600 samples and lies for 400, or slides to the end."""
+    rng = np.random.default_rng(5)
+    shots = []
+    for _ in range(24):
+        values = rng.normal(0.0, 1.5e-6, 1000)
+        if noise == "correlated":
+            for i in range(1, len(values)):
+                values[i] = 0.9 * values[i - 1] + math.sqrt(0.19) * values[i]
+        elif noise == "heavy":
+            values = 1.5e-6 * rng.standard_t(3.0, 1000) / math.sqrt(3.0)
+        last = 1000 if noise == "moving" else 600
+        values += 4e-3 * (1.0 - np.clip(1.0 - np.arange(1000) / last, 0.0, None) ** 2)
+        channel = SimpleNamespace(values=values, noise_std=None)
+        shots.append(SimpleNamespace(force=None, position=channel))
+    excitation = Excitation.DRIVEN if noise == "driven" else Excitation.TAP
+    campaign: Any = SimpleNamespace(shots=shots, excitation=excitation)
+    notes = correlated_noise(campaign, campaign)
+    assert len(notes) == (told is not None)
+    for note in notes:
+        found = re.search(r"At rest after the tap position scatters by (\S+) µm", note)
+        assert found
+        assert float(found[1]) == pytest.approx(told, rel=0.15)
 
 
 @pytest.mark.parametrize(

@@ -203,9 +203,17 @@ def test_the_equation_of_a_law_of_taps_is_all_german_and_its_numbers_are_short(c
             ("At rest before contact position scatters by 1.55 µm, 2.4 times what neighbouring samples "
              "show: ... State noise_std_m of sensors: position in campaign.yaml, and run again."),
             ("de", ("In Ruhe vor dem Kontakt streut ein Messwert um 1,55 µm (Position), das "
-                    "2,4-Fache dessen, was benachbarte zeigen: das Rauschen ist korreliert, und eine "
-                    "Abweichung dieser Größe kann die des Sensors sein. noise_std_m unter sensors: position "
-                    "in campaign.yaml angeben und neu rechnen.")),
+                    "2,4-Fache dessen, was benachbarte zeigen: das Rauschen ist korreliert oder hat "
+                    "Ausreißer, und eine Abweichung dieser Größe kann die des Sensors sein. noise_std_m "
+                    "unter sensors: position in campaign.yaml angeben und neu rechnen.")),
+        ),
+        (
+            ("At rest after the tap force scatters by 0.62 N, 1.5 times what neighbouring samples show: ... "
+             "State noise_std_n of sensors: force in campaign.yaml, and run again."),
+            ("de", ("In Ruhe nach dem Stoß streut ein Messwert um 0,62 N (Kraft), das 1,5-Fache dessen, was "
+                    "benachbarte zeigen: das Rauschen ist korreliert oder hat Ausreißer, und eine Abweichung "
+                    "dieser Größe kann die des Sensors sein. noise_std_n unter sensors: force in "
+                    "campaign.yaml angeben und neu rechnen.")),
         ),
         ("Shot 7 has a gap in time; what happened in it is lost.",
          ("de", "Stoß 7 hat eine Lücke in der Zeit; was darin geschah, ist verloren.")),

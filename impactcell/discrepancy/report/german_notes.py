@@ -66,15 +66,18 @@ def _data_fault(match: re.Match[str]) -> str:
     return "" if said is None else f"Daten, {FAULTS[kind]}: {place}{said}{more}."
 
 
+AT_REST: Final = {"before contact": "vor dem Kontakt", "after the tap": "nach dem Stoß"}
+"""When a part lies still."""
 NOTES: Final[Patterns] = (
     (r"Data, ([^:]+): (?:shot (\d+): )?(.*?)(?:; the like in (\d+) more shots)?\.", _data_fault),
     (r"The noise of (\w+) is not stated; (\S+(?: \S+)?) was estimated .*",
      lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus benachbarten Messwerten "
      "geschätzt, eine untere Schranke, wo es korreliert ist."),
-    (r"At rest before contact (\w+) scatters by (\S+ \S+), (\S+) times what .* State (\w+) of .*",
-     lambda m: f"In Ruhe vor dem Kontakt streut ein Messwert um {m[2]} ({phrase(m[1])}), das {m[3]}-Fache "
-     "dessen, was benachbarte zeigen: das Rauschen ist korreliert, und eine Abweichung dieser Größe kann "
-     f"die des Sensors sein. {m[4]} unter sensors: {m[1]} in campaign.yaml angeben und neu rechnen."),
+    (r"At rest (before contact|after the tap) (\w+) scatters by (\S+ \S+), (\S+) times .* State (\w+) of .*",
+     lambda m: f"In Ruhe {AT_REST[m[1]]} streut ein Messwert um {m[3]} ({phrase(m[2])}), das {m[4]}-Fache "
+     "dessen, was benachbarte zeigen: das Rauschen ist korreliert oder hat Ausreißer, und eine Abweichung "
+     f"dieser Größe kann die des Sensors sein. {m[5]} unter sensors: {m[2]} in campaign.yaml angeben und neu "
+     "rechnen."),
     (r"The mass of shot (\d+) is not stated and is fitted, block by block\.",
      r"Die Masse zu Stoß \1 ist nicht angegeben und wird angepasst, Block für Block."),
     (r"(\d+) of (\d+) training blocks were left out: .*",
