@@ -7,9 +7,7 @@ from 750 000 on (those from 700 000 on were looked at), those for setting number
 from 600 000 on.
 """
 
-import argparse
 import math
-import os
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +21,7 @@ from impactcell.discrepancy.workflow import investigate
 from simulator.effects import LIBRARY as LAWS
 from tests.benchmarks import _discrepancy_judge as judge
 from tests.benchmarks._discrepancy_plan import CONFOUNDED, calibrated
-from tests.benchmarks._discrepancy_run import covered, intervals, rows, study
+from tests.benchmarks._discrepancy_run import covered, from_command_line, intervals
 from tests.benchmarks.table import Table
 from tests.discrepancy.study import Job, campaign
 
@@ -128,23 +126,8 @@ def table(found: list[dict[str, Any]]) -> Table:
 
 def main() -> None:
     """Run what the arguments say, then print the table."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--rows", type=Path, help="by default apart for reporting and tuning")
-    parser.add_argument("--campaigns", type=int, default=300)
-    parser.add_argument("--limit", type=int, help="only the first so many of them")
-    parser.add_argument(
-        "--tuning", action="store_true", help="seeds that numbers of the search may be set on"
-    )
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--table", action="store_true", help="only print the table of the rows there are")
-    given = parser.parse_args()
-    plan = jobs(given.campaigns, TUNING if given.tuning else REPORTING)[: given.limit]
-    file = given.rows or (TUNING_ROWS if given.tuning else ROWS)
-    if not given.table:
-        study(file, plan, given.workers, run)
-    by_key = {job.key: job for job in plan}
-    found = [row | {"level": level(by_key[row["key"]])} for row in rows(file) if row["key"] in by_key]
-    print(table(found).markdown())
+    plan, found = from_command_line(jobs, run, 300, (REPORTING, ROWS), (TUNING, TUNING_ROWS))
+    print(table([row | {"level": level(plan[row["key"]])} for row in found]).markdown())
 
 
 if __name__ == "__main__":

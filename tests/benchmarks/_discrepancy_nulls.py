@@ -15,10 +15,8 @@ numbers of the search (`--tuning`) from 790 000 on. Classes:
   must be there).
 """
 
-import argparse
 import json
 import math
-import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
@@ -38,7 +36,7 @@ from impactcell.records import Capture, Channel, Samples
 from simulator.campaign import make
 from simulator.campaign_scenario import CampaignScenario
 from tests.benchmarks import _discrepancy_judge as judge
-from tests.benchmarks._discrepancy_run import rows, study
+from tests.benchmarks._discrepancy_run import from_command_line
 from tests.benchmarks.table import Table
 from tests.conftest import SHARED
 from tests.discrepancy.study import RATE_HZ, Job, recorded, scenario
@@ -222,22 +220,8 @@ def table(found: list[dict[str, Any]]) -> Table:
 
 def main() -> None:
     """Run what the arguments say, then print the table."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--rows", type=Path, help="by default apart for reporting and tuning")
-    parser.add_argument("--campaigns", type=int, default=500)
-    parser.add_argument("--limit", type=int, help="only the first so many of them")
-    parser.add_argument(
-        "--tuning", action="store_true", help="seeds that numbers of the search may be set on"
-    )
-    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--table", action="store_true", help="only print the table of the rows there are")
-    given = parser.parse_args()
-    plan = jobs(given.campaigns, TUNING if given.tuning else REPORTING)[: given.limit]
-    file = given.rows or (TUNING_ROWS if given.tuning else ROWS)
-    if not given.table:
-        study(file, plan, given.workers, run)
-    keys = {job.key for job in plan}
-    print(table([row for row in rows(file) if row["key"] in keys]).markdown())
+    _, found = from_command_line(jobs, run, 500, (REPORTING, ROWS), (TUNING, TUNING_ROWS))
+    print(table(found).markdown())
 
 
 if __name__ == "__main__":

@@ -1,7 +1,9 @@
 """Runs the discrepancy study: a row of a file for each campaign, resumable."""
 
+import argparse
 import json
 import math
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable
@@ -119,3 +121,33 @@ def study(file: Path, todo: Iterable[Any], workers: int, work: Callable[[Any], d
             said = {"key": given[future].key, "verdict": "error", "error": f"{type(error).__name__}: {error}"}
             out.write(json.dumps(said if error else future.result(), allow_nan=True) + "\n")
             out.flush()
+
+
+def from_command_line(
+    jobs: Callable[[int, int], list[Any]],
+    run_one: Callable[[Any], dict[str, Any]],
+    campaigns: int,
+    reporting: tuple[int, Path],
+    tuning: tuple[int, Path],
+) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Run a study as its arguments say; its jobs by their keys, and the rows there are of them.
+
+    `reporting` and `tuning` are the first seed and the file of rows of each; `jobs` takes how many there are,
+    and the first seed.
+    """
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--rows", type=Path, help="by default apart for reporting and tuning")
+    parser.add_argument("--campaigns", type=int, default=campaigns)
+    parser.add_argument("--limit", type=int, help="only the first so many of them")
+    parser.add_argument(
+        "--tuning", action="store_true", help="seeds that numbers of the search may be set on"
+    )
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--table", action="store_true", help="only print the table of the rows there are")
+    given = parser.parse_args()
+    first, file = tuning if given.tuning else reporting
+    plan = {job.key: job for job in jobs(given.campaigns, first)[: given.limit]}
+    file = given.rows or file
+    if not given.table:
+        study(file, list(plan.values()), given.workers, run_one)
+    return plan, [row for row in rows(file) if row["key"] in plan]
