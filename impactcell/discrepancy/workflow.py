@@ -9,10 +9,8 @@ from impactcell.discrepancy.data import (
     NoiseFloor,
     PreparedCampaign,
     ReplicateSpread,
-    decimate,
     prepare,
     sensor_noise,
-    shot_set,
     split_held_out,
 )
 from impactcell.discrepancy.laws import LawFinding, estimate_effects, find_law, hold_against_free_forms
@@ -22,11 +20,10 @@ from impactcell.discrepancy.model import (
     Problem,
     decided_blocks,
     estimate_parameters,
-    fit_nominal,
     linearise,
     refit_shot_parameters,
-    usable_blocks,
 )
+from impactcell.discrepancy.nominal_model import NominalModel, OtherContact, nominal_models, problem_of
 from impactcell.discrepancy.search import (
     MAX_P_VALUE,
     UNKNOWN,
@@ -56,9 +53,6 @@ from impactcell.discrepancy.search import (
 )
 from impactcell.physics import Kind, Plant
 from impactcell.physics.effects import LIBRARY
-
-COARSE_SAMPLES = 400
-"""Samples of a channel and shot that a search among many models reads."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,20 +148,13 @@ def investigate(
     floor = sensor_noise(prepared)
     training, held_out = split_held_out(prepared, seed)
     report_step("fitting the nominal model")
-    problem = _problem(prepared, floor, training)
-    nominal = fit_nominal(problem, plant)
-    if prepared.excitation.selects_blocks:
-        kept = usable_blocks(problem, nominal)
-        if len(kept) < len(training):
-            prepared = replace(prepared, notes=(*prepared.notes, _left_out(training, kept)))
-            training = training[kept]
-            problem = _problem(prepared, floor, training)
-            nominal = fit_nominal(problem, plant)
+    start, other = nominal_models(prepared, floor, training, plant)
+    training = start.training
     missing = missing_shots(len(training), len(held_out))
     context = SearchContext(
-        problem,
-        _coarse(problem),
-        prepared,
+        start.problem,
+        start.coarse,
+        start.prepared,
         _nameable(prepared, library),
         seed,
         mapper or (lambda function, items: [function(item) for item in items]),
@@ -175,17 +162,20 @@ def investigate(
         floor_is_certain="stated" in floor.source or prepared.excitation.floor_is_certain,
     )
     report_step("locating the gap and naming effects")
-    selection = only_test(context, nominal) if missing else select_model(context, nominal)
+    selection = only_test(context, start.fit) if missing else select_model(context, start.fit)
+    if other and (selection.accepted is None or selection.remains):
+        start, context, selection = _with_other_contact(context, start, selection, other)
+    prepared, problem, nominal = start.prepared, start.problem, start.fit
     if not missing:
         report_step("holding names against free forms")
         selection = hold_against_free_forms(context, selection)
     nested = nested_models(context, selection)
     report_step("proving on held-out shots")
-    held_problem = _problem(prepared, floor, held_out)
+    held_problem = problem_of(prepared, floor, held_out)
     if prepared.excitation.selects_blocks:
         largest = refit_shot_parameters(held_problem, nested.largest)
         held_out = held_out[decided_blocks(held_problem, largest)]
-        held_problem = _problem(prepared, floor, held_out)
+        held_problem = problem_of(prepared, floor, held_out)
         missing = missing or missing_shots(len(training), len(held_out))
     opened = OpenedShots(prepared, floor, (training, held_out), (problem, held_problem), seed)
     outcome = opened.validate(NestedModels({frozenset(): nominal}) if missing else nested)
@@ -227,6 +217,20 @@ def investigate(
     )
 
 
+def _with_other_contact(
+    context: SearchContext, start: NominalModel, selection: SelectionResult, other: OtherContact
+) -> tuple[NominalModel, SearchContext, SelectionResult]:
+    """Exchange what leaves something for the model with first contact open, if that explains the shots.
+
+    Effects beside it are looked for only where too few replicates say that contact is at t = 0.
+    """
+    nominal = other.nominal
+    beside = replace(context, problem=nominal.problem, coarse=nominal.coarse, prepared=nominal.prepared)
+    found = (select_model if other.scatter.is_open else only_test)(beside, nominal.fit)
+    explains = found.accepted is not None and not found.remains
+    return (nominal, beside, found) if explains else (start, context, selection)
+
+
 def _confirmed_rival(
     context: SearchContext, selection: SelectionResult, opened: OpenedShots, outcome: HeldOutOutcome
 ) -> tuple[SelectionResult, HeldOutOutcome]:
@@ -249,16 +253,6 @@ def _evidence(context: SearchContext, selection: SelectionResult, final: Fit) ->
     return selection.final if selection.is_accepted(final) else context.test_model(final)
 
 
-def _problem(prepared: PreparedCampaign, floor: NoiseFloor, indices: IndexArray) -> Problem:
-    return Problem(shot_set(prepared, indices, floor.noise_std), len(prepared.batches))
-
-
-def _coarse(problem: Problem) -> Problem:
-    """Return the same problem on fewer samples."""
-    fewer = decimate(problem.shots, COARSE_SAMPLES)
-    return problem if fewer is problem.shots else Problem(fewer, problem.batches)
-
-
 def _nameable(prepared: PreparedCampaign, library: Sequence[str] | None) -> tuple[str, ...]:
     """Effects that may be named: of the library, those that such shots can test."""
     names = tuple(LIBRARY) if library is None else tuple(library)
@@ -266,13 +260,6 @@ def _nameable(prepared: PreparedCampaign, library: Sequence[str] | None) -> tupl
     if prepared.excitation.tests_between_shots:
         return names
     return tuple(name for name in names if LIBRARY[name].kind is not Kind.BETWEEN_SHOTS)
-
-
-def _left_out(training: IndexArray, kept: IndexArray) -> str:
-    return (
-        f"{len(training) - len(kept)} of {len(training)} training blocks were left out: in them stick ends, "
-        "or does not, by so little that noise decides, or the nominal model does not follow them."
-    )
 
 
 def _tied_models(selection: SelectionResult, established: tuple[str, ...]) -> list[tuple[str, str, Fit]]:

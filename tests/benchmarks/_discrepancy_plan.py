@@ -17,7 +17,7 @@ from simulator.campaign import make
 from simulator.effects import LIBRARY as LAWS
 from simulator.effects import UNLISTED
 from tests.discrepancy import study
-from tests.discrepancy.study import Job, recorded, scenario
+from tests.discrepancy.study import LOGGED, Job, recorded, scenario
 
 CONFOUNDED = frozenset({"mass_error", "force_sensor_gain"})
 EQUIVALENT = (
@@ -69,6 +69,18 @@ def jobs(
             for place, job in enumerate(made)
         ]
     return [job for _, _, job in sorted(placed, key=lambda one: one[:2])]
+
+
+def logged_jobs(later: int = 0) -> list[Job]:
+    """Campaigns whose contact lies anywhere between two samples: every effect twice, what lies outside of the
+    vocabulary twice, and 40 with nothing hidden.
+    """
+    made = [
+        *(replace(job, kind=LOGGED) for job in _single("single", 2, VISIBLE, 80_000)),
+        *(replace(job, kind=f"{LOGGED} outside", seed=job.seed + 50_000) for job in _outside(2)),
+        *(replace(job, kind=f"{LOGGED} none", seed=job.seed + 50_000) for job in _none(40)),
+    ]
+    return [replace(job, seed=job.seed + later) for job in made]
 
 
 def _target(seed: int, bounds: tuple[float, float]) -> float:

@@ -18,9 +18,10 @@ import numpy as np
 from tests.benchmarks import _discrepancy_judge as judge
 from tests.benchmarks import _discrepancy_rivals as rivals
 from tests.benchmarks._discrepancy_judge import judged
-from tests.benchmarks._discrepancy_plan import CONFOUNDED, jobs
+from tests.benchmarks._discrepancy_plan import CONFOUNDED, jobs, logged_jobs
 from tests.benchmarks._discrepancy_run import ROWS, rows, study
 from tests.benchmarks.table import Table
+from tests.discrepancy.study import LOGGED
 
 Row = dict[str, Any]
 README = Path("impactcell/discrepancy/README.md")
@@ -49,6 +50,8 @@ def kept(found: list[Row], kind: str) -> list[Row]:
 def tables(file: Path = ROWS) -> list[Table]:
     """Bars, hidden effect against answer, and the rivals, from the rows there are."""
     found = rows(file)
+    if logged := [row for row in found if row["job"]["kind"].startswith(LOGGED)]:
+        return [bars_of_logged(logged)]
     rival = rivals.table(found, rows(rivals.beside(file)))
     return [bars(found), *([rival] if rival else []), confusion(found), reach(found)]
 
@@ -101,6 +104,28 @@ def bars(found: list[Row]) -> Table:
     alone, none = (sum(bool(row["job"]["hidden"]) is said for row in found) for said in (True, False))
     note = f"{alone} campaigns with hidden effects and {none} without, made by the simulator's own plant."
     return Table("Discrepancy: bars", ("what", "bar", "measured", "95 % interval"), made, note)
+
+
+def bars_of_logged(found: list[Row]) -> Table:
+    """What becomes of an answer where a logger shows contact by its samples only."""
+    made: list[list[str]] = []
+
+    def bar(what: str, limit: str, of: list[Row], holds: Callable[[Row], bool]) -> None:
+        made.append([what, limit, *judge.share(sum(map(holds, of)), len(of))])
+
+    one, none, outside = (kept(found, f"{LOGGED}{kind}") for kind in ("", " none", " outside"))
+    bar("one hidden, visible: named, or tied with it", ">= 95 %", one, lambda row: judged(row) in NAMED)
+    bar("one hidden: anything else named", "<= 5 %", one, lambda row: judged(row) in FALSELY)
+    bar("nothing hidden: something named", "<= 5 %", none, lambda row: bool(row.get("named")))
+    bar("nothing hidden: no gap", "-", none, lambda row: judged(row) == judge.NO_GAP)
+    bar("outside the vocabulary: unknown", ">= 90 %", outside, lambda row: row["verdict"] == judge.UNKNOWN)
+    bar("outside: nothing falsely listed", ">= 80 %", outside, lambda row: not row.get("named"))
+    return Table(
+        "Discrepancy: contact anywhere between two samples",
+        ("what", "bar", "measured", "95 % interval"),
+        made,
+        f"{len(found)} campaigns.",
+    )
 
 
 def closed(right: list[Row]) -> list[list[str]]:
@@ -177,13 +202,16 @@ def main() -> None:
     parser.add_argument("--limit", type=int, help="only the first so many jobs of the plan")
     parser.add_argument("--later", type=int, default=0, help="add this to every seed: campaigns never seen")
     parser.add_argument("--three", type=int, default=0, help="so many campaigns of three effects as well")
+    parser.add_argument(
+        "--logged", action="store_true", help="only campaigns whose contact lies between two samples"
+    )
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--rivals", action="store_true", help="run the rivals on every third campaign")
     parser.add_argument("--table", action="store_true", help="only print the tables of the rows there are")
     parser.add_argument("--readme", action="store_true", help="write these tables into the README, too")
     given = parser.parse_args()
     wanted = set(filter(None, given.kinds.split(",")))
-    every = jobs(later=given.later, three=given.three)
+    every = logged_jobs(given.later) if given.logged else jobs(later=given.later, three=given.three)
     plan = [job for job in every if not wanted or job.kind in wanted][: given.limit]
     if given.rivals:
         study(rivals.beside(given.rows), rivals.subset(plan, rows(given.rows)), given.workers, rivals.run)

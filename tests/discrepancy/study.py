@@ -6,7 +6,7 @@ hidden are drawn from its seed; how strong it is, is given, or calibrated to a g
 
 import json
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,10 @@ from simulator.effects import Parameter as Value
 MM_PER_MIN = 1e-3 / 60.0
 RATE_HZ = 5000.0
 NOISE = {"force": 0.4, "position": 1.5e-6, "actuator": 1.5e-6}
+FINER = 8
+"""How many times as often the plant is sampled as a logger samples it, which sees contact by its samples."""
+LOGGED = "logged"
+"""How kinds of jobs begin whose campaigns a logger has recorded."""
 SIGNED = frozenset(
     {
         "batch_shift", "direction_asymmetry", "force_sensor_gain", "force_sensor_offset", "friction_drift",
@@ -140,9 +144,62 @@ def scenario(job: Job, multiples: Sequence[float] = ()) -> CampaignScenario:
 
 
 def campaign(job: Job, multiples: Sequence[float] = ()) -> Campaign:
-    """Make the campaign of a job."""
+    """Make the campaign of a job; of a kind that is `LOGGED` as a logger has it."""
+    if job.kind.startswith(LOGGED):
+        return logged(job, multiples)[0]
     plan = scenario(job, multiples)
     return recorded(plan, make(plan)[1])
+
+
+def logged(
+    job: Job, multiples: Sequence[float] = (), before: tuple[int, int] | None = None
+) -> tuple[Campaign, list[float]]:
+    """Make the campaign of a job as a logger has it: contact lies anywhere between two samples.
+
+    Parameters
+    ----------
+    before : tuple of int, optional
+        So many samples, at least and fewer than, that a record has before contact; without it a record begins
+        with the first sample of contact.
+
+    Returns
+    -------
+    campaign : Campaign
+    onsets : list of float
+        Time of contact of each shot [s].
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tests.discrepancy.study.RATE_HZ", FINER * RATE_HZ)
+        plan = scenario(job, multiples)
+        fine = recorded(plan, make(plan)[1])
+    rng = np.random.default_rng([job.seed, 77])
+    shots, onsets = [], []
+    for shot in fine.shots:
+        phase = int(rng.integers(FINER))
+        samples = int(rng.integers(*before)) if before else 0
+        shots.append(_logged_shot(shot, phase, samples, rng))
+        assert shot.force is not None
+        onsets.append(samples / RATE_HZ - float(shot.force.time_s[phase]))
+    sensors = {name: replace(one, rate_hz=RATE_HZ) for name, one in fine.sensors.items()}
+    return replace(fine, shots=tuple(shots), sensors=sensors), onsets
+
+
+def _logged_shot(shot: Capture, phase: int, before: int, rng: np.random.Generator) -> Capture:
+    def seen(channel: Channel | None, speed_m_s: float) -> Channel | None:
+        if channel is None:
+            return None
+        time_s, values = channel.time_s[phase::FINER], channel.values[phase::FINER]
+        earlier_s = time_s[0] - np.arange(before, 0, -1) / RATE_HZ
+        noise = channel.noise_std * rng.standard_normal(before) if channel.noise_std else np.zeros(before)
+        time_s, values = np.append(earlier_s, time_s), np.append(speed_m_s * earlier_s + noise, values)
+        return replace(channel, time_s=time_s - time_s[0], values=values)
+
+    return replace(
+        shot,
+        force=seen(shot.force, 0.0),
+        position=seen(shot.position, 0.0),
+        actuator=seen(shot.actuator, shot.velocity_m_s),
+    )
 
 
 def quick_campaign(job: Job, multiples: Sequence[float] = ()) -> Campaign:

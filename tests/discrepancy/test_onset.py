@@ -1,65 +1,36 @@
-"""Records that begin before contact show contact by their samples only: each shot has an onset of its own."""
+"""A logger shows contact by its samples only: each shot has an onset of its own. An exact one has none."""
 
+import math
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from impactcell.campaign import Campaign
-from impactcell.discrepancy.data import prepare, shot_set
+from impactcell.discrepancy.data import prepare, sensor_noise, shot_set, split_held_out
 from impactcell.discrepancy.model import Problem
-from impactcell.records import Capture, Channel
+from impactcell.discrepancy.nominal_model import nominal_models
+from impactcell.discrepancy.report.german_notes import note
+from impactcell.discrepancy.workflow import DiscrepancyResult
+from impactcell.records import Capture
 from tests.discrepancy import study
-from tests.discrepancy.study import Job, campaign, name_effects
+from tests.discrepancy.study import Job, campaign, logged, name_effects
 
-FINER = 8
-"""How many times as often the plant is sampled as the logger samples it."""
 JOB = Job("none", (), 5_060_000, shots=30)
 """With contact put where the force begins, good to a part of a step, this was a gap of 1.16 noise floors."""
+BEFORE = (20, 60)
+"""Samples before contact of records that begin earlier."""
+STEP_S = 1.0 / study.RATE_HZ
+NOTE = "First contact lies"
+"""How the note begins that says so."""
 
 
-def logged(job: Job) -> tuple[Campaign, list[float]]:
-    """The campaign of a job as a logger has it: contact lies anywhere between two samples.
-
-    Returns
-    -------
-    campaign : Campaign
-    onsets : list of float
-        Time of contact of each shot [s].
-    """
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study, "RATE_HZ", FINER * study.RATE_HZ)
-        fine = campaign(job)
-    rng = np.random.default_rng([job.seed, 77])
-    shots, onsets = [], []
-    for shot in fine.shots:
-        phase, before = int(rng.integers(FINER)), int(rng.integers(20, 60))
-        shots.append(_logged_shot(shot, phase, before, rng))
-        assert shot.force is not None
-        onsets.append(before / study.RATE_HZ - float(shot.force.time_s[phase]))
-    return replace(fine, shots=tuple(shots)), onsets
-
-
-def _logged_shot(shot: Capture, phase: int, before: int, rng: np.random.Generator) -> Capture:
-    def seen(channel: Channel | None, speed_m_s: float) -> Channel | None:
-        if channel is None:
-            return None
-        time_s, values = channel.time_s[phase::FINER], channel.values[phase::FINER]
-        earlier_s = time_s[0] - np.arange(before, 0, -1) / study.RATE_HZ
-        noise = channel.noise_std * rng.standard_normal(before) if channel.noise_std else np.zeros(before)
-        time_s, values = np.append(earlier_s, time_s), np.append(speed_m_s * earlier_s + noise, values)
-        return replace(channel, time_s=time_s - time_s[0], values=values)
-
-    return replace(
-        shot,
-        force=seen(shot.force, 0.0),
-        position=seen(shot.position, 0.0),
-        actuator=seen(shot.actuator, shot.velocity_m_s),
-    )
+def notes_of_contact(found: DiscrepancyResult) -> list[str]:
+    return [one for one in found.prepared.notes if one.startswith(NOTE)]
 
 
 def test_nothing_hidden_is_no_gap_and_each_onset_is_found() -> None:
-    given, onsets = logged(JOB)
+    given, onsets = logged(JOB, before=BEFORE)
     found = name_effects(given, seed=JOB.seed)
     assert found.conclusion.verdict == "no_gap"
     # By the clock of the logger: of the first sample that is kept, less how long after contact it is.
@@ -69,13 +40,13 @@ def test_nothing_hidden_is_no_gap_and_each_onset_is_found() -> None:
     kept_s = [clock.time_s[-size] for clock, size in zip(clocks, sizes, strict=True) if clock is not None]
     contact_s = np.array(kept_s) - (np.array(first_s) - found.nominal.shot_parameters.onset_s)
     error = contact_s - np.array([onsets[int(i)] for i in found.training])
-    step_s = 1.0 / study.RATE_HZ
-    assert error.std() < 0.02 * step_s
-    assert abs(error.mean()) < 0.02 * step_s
+    assert error.std() < 0.02 * STEP_S
+    assert abs(error.mean()) < 0.02 * STEP_S
+    assert not notes_of_contact(found)
 
 
 def test_a_record_that_begins_with_contact_has_no_onset_to_be_found() -> None:
-    for given, free in ((campaign(JOB), False), (logged(JOB)[0], True)):
+    for given, free in ((campaign(JOB), False), (logged(JOB, before=BEFORE)[0], True)):
         prepared = prepare(given)
         steps = {shot.onset_step_s for shot in prepared.shots}
         assert all((step > 0.0) == free for step in steps)
@@ -83,15 +54,86 @@ def test_a_record_that_begins_with_contact_has_no_onset_to_be_found() -> None:
         assert first > max(steps)
 
 
+def test_records_of_which_one_begins_before_contact_all_have_an_onset() -> None:
+    given = campaign(JOB)
+    first = given.shots[0].position
+    assert first is not None
+    time_s, values = np.append(-STEP_S, first.time_s), np.append(0.0, first.values)
+    early = replace(given.shots[0], position=replace(first, time_s=time_s, values=values))
+    prepared = prepare(replace(given, shots=(early, *given.shots[1:])))
+    assert all(shot.onset_step_s == pytest.approx(STEP_S) for shot in prepared.shots)
+
+
+@pytest.mark.parametrize("replicates", [True, False])
+def test_contact_between_samples_is_seen_in_records_that_begin_with_it(replicates: bool) -> None:
+    """A record of the first sample of contact and what follows; taken as told, the gap would be 2 to 4."""
+    job = replace(JOB, replicates=replicates)
+    given, onsets = logged(job)
+    found = name_effects(given, seed=job.seed)
+    assert found.conclusion.verdict == "no_gap"
+    error = found.nominal.shot_parameters.onset_s - np.array([onsets[int(i)] for i in found.training])
+    assert np.abs(error).max() < 0.05 * STEP_S
+    (said,) = notes_of_contact(found)
+    told = re.fullmatch(r"First contact lies (-\d+) to (-\d+) µs from t = 0, within a .*", said)
+    assert told
+    ends = np.quantile([1e6 * onsets[int(i)] for i in found.training], (0.0, 1.0))
+    np.testing.assert_allclose([float(told[1]), float(told[2])], ends, atol=6.0)
+    assert note(said)[0] == "de"
+
+
+def test_an_effect_is_named_beside_contact_between_samples() -> None:
+    job = Job("single", ("quadratic_drag",), 5_060_001, shots=30)
+    found = name_effects(logged(job)[0], seed=job.seed)
+    assert (found.conclusion.verdict, found.added) == ("named", ("quadratic_drag",))
+    assert notes_of_contact(found)
+    gap = found.validation.held_out
+    assert gap.after.trace < 1.05 < 2.0 < gap.before.trace
+
+
+def test_a_trigger_that_is_late_by_the_same_in_every_shot_is_no_gap() -> None:
+    """No scatter shows it: it is what is left where no effect explains the shots."""
+
+    def late(shot: Capture) -> Capture:
+        channels = {
+            name: replace(channel, time_s=channel.time_s - 0.3 * STEP_S)
+            for name in ("force", "position", "actuator")
+            if (channel := getattr(shot, name)) is not None
+        }
+        return replace(shot, **channels)
+
+    given = campaign(JOB)
+    found = name_effects(replace(given, shots=tuple(map(late, given.shots))), seed=JOB.seed)
+    assert (found.conclusion.verdict, found.added) == ("no_gap", ())
+    np.testing.assert_allclose(found.nominal.shot_parameters.onset_s, -0.3 * STEP_S, atol=0.05 * STEP_S)
+    assert notes_of_contact(found)
+
+
+@pytest.mark.parametrize("replicates", [True, False])
+@pytest.mark.parametrize(
+    "effect", ["hertz_contact", "actuator_droop", "magnetic_pull", "periodic_friction", "friction_drift"]
+)
+def test_an_effect_does_not_look_like_contact_between_samples(effect: str, replicates: bool) -> None:
+    """It moves contact, too, but alike in like shots; where there are none, nothing is said at first."""
+    job = Job("single", (effect,), 5_060_002, strength=2.0, shots=30, replicates=replicates)
+    prepared = prepare(campaign(job))
+    training, _ = split_held_out(prepared, job.seed)
+    nominal, other = nominal_models(prepared, sensor_noise(prepared), training, None)
+    assert other is not None
+    assert not nominal.is_open
+    assert other.nominal.is_open
+    assert other.scatter.is_open
+    assert math.isnan(other.scatter.std_s) != replicates
+
+
 def test_an_onset_stays_within_its_step() -> None:
-    prepared = prepare(logged(JOB)[0])
+    prepared = prepare(logged(JOB, before=BEFORE)[0])
     everything = shot_set(prepared, np.arange(len(prepared.shots)), (0.4, 1.5e-6, 1.5e-6))
     problem = Problem(everything, len(prepared.batches))
     steps = np.zeros((problem.count, len(problem.shot_parameter_names)))
     steps[:, problem.shot_parameter_names.index("onset_s")] = 1.0
     moved = problem.step_shot_parameters(problem.initial_guess(), steps)
     np.testing.assert_array_equal(moved.onset_s, problem.onset_step_s)
-    assert problem.onset_step_s == pytest.approx(1.0 / study.RATE_HZ)
+    assert problem.onset_step_s == pytest.approx(STEP_S)
 
 
 def test_force_at_first_contact_itself_is_no_gap() -> None:

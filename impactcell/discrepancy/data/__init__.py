@@ -15,6 +15,7 @@ from impactcell.discrepancy.data.prepared_campaign import (
     prepare,
     shot_set,
     split_held_out,
+    with_open_onset,
 )
 from impactcell.discrepancy.data.prepared_shots import (
     CHANNELS,
@@ -52,4 +53,5 @@ __all__ = [
     "sensor_noise",
     "shot_set",
     "split_held_out",
+    "with_open_onset",
 ]

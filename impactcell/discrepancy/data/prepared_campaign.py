@@ -27,7 +27,7 @@ from impactcell.discrepancy.data.unit_checks import check_units
 from impactcell.errors import CampaignError
 from impactcell.features import noise_std
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
-from impactcell.records import Capture, Channel, Samples
+from impactcell.records import Capture, Channel, Samples, sampling_step_s
 
 STRATEGIES: dict[Excitation, ExcitationStrategy] = {
     strategy.excitation: strategy for strategy in (Tap(), FreeSlide(), Driven())
@@ -39,6 +39,8 @@ TIME_GAP_FACTOR = 5.0
 """A step of time this many times the median one is a gap in the record."""
 MIN_DWELL_S = 0.1
 """Dwell [s] from which on stiction ages, as the law of `stiction_ageing` has it."""
+ROUNDING = 1e-6
+"""Of a sampling step: a sample that comes one after contact is of that step."""
 NO_SAMPLES = np.empty(0)
 """Samples of a channel that was not recorded."""
 
@@ -98,8 +100,9 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         key = _settings(capture) if strategy.has_replicates else (float(number),)
         group = groups.setdefault(key, len(groups))
         batch = batches.index(capture.batch_id or "")
-        shot = _prepared_shot(strategy, capture, (record, len(campaign.shots)), batch, group)
-        shots.append(_with_open_onset(shot) if capture.onset_std_s else shot)
+        shots.append(_prepared_shot(strategy, capture, (record, len(campaign.shots)), batch, group))
+    if any(capture.onset_std_s for capture, _ in captures):
+        shots = list(map(_with_open_onset, shots))
     notes += strategy.missing_information(shots)
     notes += _time_gaps(shots)
     _check_units(campaign, shots)
@@ -200,27 +203,29 @@ def _prepared_shot(
         values=_channel_arrays(channels, "values"),
         drive=strategy.drive(capture),
         covariates=strategy.adjust_covariates(covariates),
+        sampling_step_s=sampling_step_s(capture),
     )
+
+
+def with_open_onset(prepared: PreparedCampaign) -> PreparedCampaign:
+    """Let first contact of every shot lie within a sampling step of t = 0."""
+    return replace(prepared, shots=tuple(map(_with_open_onset, prepared.shots)))
 
 
 def _with_open_onset(shot: PreparedShot) -> PreparedShot:
     """Let first contact lie within a sampling step of t = 0; the samples of that step say nothing.
 
-    Where a record begins before contact it shows contact by its samples only, and at 4000 mm/min the actuator
-    goes 13 um in a step of 0.2 ms. The step is that of the force, of the position where there is none.
+    A recorder shows contact by its samples only, and at 4000 mm/min the actuator goes 13 um in a step of
+    0.2 ms. The step is that of the force, of the position where there is none.
     """
-    time_s = next((times for times in shot.times if times.size > 1), NO_SAMPLES)
-    if not time_s.size:
-        return shot
-    step_s = float(np.median(np.diff(time_s)))
-    kept = [times > step_s for times in shot.times]
+    kept = [times > (1.0 + ROUNDING) * shot.sampling_step_s for times in shot.times]
     force, position, actuator = (times[part] for times, part in zip(shot.times, kept, strict=True))
     values = [samples[part] for samples, part in zip(shot.values, kept, strict=True)]
     return replace(
         shot,
         times=(force, position, actuator),
         values=(values[0], values[1], values[2]),
-        onset_step_s=step_s,
+        onset_is_open=True,
     )
 
 

@@ -47,8 +47,10 @@ class PreparedShot:
         `dwell` the base-10 logarithm of the dwell in seconds, at least that of `MIN_DWELL_S`.
     whitener : ndarray, shape (n, n)
         Makes residuals of a driven block independent and of unit variance; shape (0, 0) elsewhere.
-    onset_step_s : float
-        How far first contact may lie from t = 0: the sampling step where a record began before it; else 0.
+    sampling_step_s : float
+        Of the force, of another channel where there is none.
+    onset_is_open : bool
+        Whether first contact may lie anywhere within a sampling step of t = 0.
     """
 
     number: int
@@ -66,7 +68,13 @@ class PreparedShot:
     drive: Samples
     covariates: dict[str, float]
     whitener: Samples = field(default_factory=lambda: np.empty((0, 0)))
-    onset_step_s: float = 0.0
+    sampling_step_s: float = 0.0
+    onset_is_open: bool = False
+
+    @property
+    def onset_step_s(self) -> float:
+        """How far first contact may lie from t = 0 [s]."""
+        return self.sampling_step_s if self.onset_is_open else 0.0
 
     @property
     def columns(self) -> tuple[tuple[str, float], ...]:

@@ -2,6 +2,12 @@
 
 from impactcell.discrepancy.model.block_selection import decided_blocks, usable_blocks
 from impactcell.discrepancy.model.constraints import Constraints, Roughness, Support
+from impactcell.discrepancy.model.contact_moment import (
+    ContactScatter,
+    contact_note,
+    contact_scatter,
+    free_contact,
+)
 from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.intervals import ParameterEstimate, SharedError, estimate_parameters
 from impactcell.discrepancy.model.least_squares import (
@@ -33,6 +39,7 @@ from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
 
 __all__ = [
     "Constraints",
+    "ContactScatter",
     "Coordinate",
     "DirectionProducts",
     "Fit",
@@ -46,6 +53,8 @@ __all__ = [
     "SplitFits",
     "Support",
     "concatenate_products",
+    "contact_note",
+    "contact_scatter",
     "decided_blocks",
     "direction_products",
     "effect_coordinates",
@@ -53,6 +62,7 @@ __all__ = [
     "fit",
     "fit_nominal",
     "fit_split",
+    "free_contact",
     "linearise",
     "normal_equations",
     "parameter_name",

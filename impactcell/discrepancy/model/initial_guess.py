@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from impactcell.discrepancy.model.contact_moment import free_contact
 from impactcell.discrepancy.model.least_squares import Fit, fit, initial_shot_parameters
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.errors import DiscrepancyError
@@ -15,11 +16,15 @@ from impactcell.records import Samples
 def fit_nominal(problem: Problem, plant: Plant | None = None) -> Fit:
     """Fit the nominal plant from starts taken off the data, or from a plant that is given with its effects.
 
+    Where first contact is open, it is at t = 0 first: from afar a wrong plant would move it to an end.
+
     Raises
     ------
     DiscrepancyError
         No start leads to a fit.
     """
+    if problem.onset_step_s.any():
+        return free_contact(problem, fit_nominal(problem.with_exact_contact(), plant))
     shots = problem.shots
     guesses = shots.excitation.plant_guesses(shots.items, shots.gravity_m_s2)
     nominal = problem.with_effects(())

@@ -120,6 +120,12 @@ class Problem:
         """Return another model on the same shots, told what to hold and what to penalise."""
         return self._like(effects, constraints)
 
+    def with_exact_contact(self) -> "Problem":
+        """Return the same model of shots whose first contact is at t = 0."""
+        items = tuple(replace(shot, onset_is_open=False) for shot in self.shots.items)
+        shots = replace(self.shots, items=items)
+        return Problem(shots, self.batches, self.effects, self.constraints)
+
     def _like(self, effects: tuple[str, ...], constraints: Constraints) -> "Problem":
         other = object.__new__(Problem)
         other._set(self.forward, effects, constraints)

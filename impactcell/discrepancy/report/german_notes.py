@@ -78,6 +78,9 @@ NOTES: Final[Patterns] = (
      "dessen, was benachbarte zeigen: das Rauschen ist korreliert oder hat Ausreißer, und eine Abweichung "
      f"dieser Größe kann die des Sensors sein. {m[5]} unter sensors: {m[2]} in campaign.yaml angeben und neu "
      "rechnen."),
+    (r"First contact lies (\S+) to (\S+) µs from t = 0, .*",
+     (r"Der erste Kontakt liegt \1 bis \2 µs von t = 0, innerhalb eines Abtastschritts: "
+      "er wird Stoß für Stoß angepasst.")),
     (r"The mass of shot (\d+) is not stated and is fitted, block by block\.",
      r"Die Masse zu Stoß \1 ist nicht angegeben und wird angepasst, Block für Block."),
     (r"(\d+) of (\d+) training blocks were left out: .*",
