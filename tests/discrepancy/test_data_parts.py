@@ -1,8 +1,7 @@
 """Parts of the data by themselves: drives, blocks, columns and what is held out."""
 
 import math
-import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,13 +9,15 @@ import numpy as np
 import pytest
 
 from impactcell.campaign import Excitation
-from impactcell.discrepancy.data import driven_blocks, measured_drive, prepared_campaign
+from impactcell.discrepancy.data import driven_blocks, measured_drive, prepare, prepared_campaign
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.measured_drive import SmoothedDrive, position_response, smooth_drive
-from impactcell.discrepancy.data.noise_at_rest import correlated_noise
+from impactcell.discrepancy.data.noise_at_rest import NoiseAtRest, noise_at_rest, std_of_pieces
 from impactcell.discrepancy.data.noise_floor import sensor_noise
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio, check_units
 from impactcell.errors import CampaignError
+from impactcell.records import Capture
+from tests.discrepancy.study import Job, campaign, name_effects
 
 
 def test_a_part_that_turns_round_goes_on_by_the_ratio_of_its_accelerations() -> None:
@@ -110,7 +111,7 @@ def test_a_channel_that_shows_no_noise_and_states_none_is_refused() -> None:
 
 @pytest.mark.parametrize("correlation", [0.0, 0.8])
 @pytest.mark.parametrize("stated", [None, 1.5e-6])
-def test_noise_at_rest_that_is_more_than_neighbours_show_is_told(
+def test_noise_before_contact_that_is_more_than_neighbours_show_is_taken(
     correlation: float, stated: float | None
 ) -> None:
     """First-order autoregressive noise of a standard deviation of 1.5 µm, 200 samples before contact."""
@@ -122,16 +123,15 @@ def test_noise_at_rest_that_is_more_than_neighbours_show_is_told(
             values[i] = correlation * values[i - 1] + math.sqrt(1.0 - correlation**2) * values[i]
         values[60] += 1e-4 * (shot % 6 == 0)  # a spike in some shots
         whole, kept = (SimpleNamespace(values=part, noise_std=stated) for part in (values, values[200:]))
-        recorded.append(SimpleNamespace(force=None, position=whole))
-        counted.append(SimpleNamespace(force=None, position=kept))
+        recorded.append(SimpleNamespace(force=None, position=whole, actuator=None))
+        counted.append(SimpleNamespace(force=None, position=kept, actuator=None))
     whole_campaign = SimpleNamespace(shots=recorded, excitation=Excitation.TAP)
     campaigns: Any = (whole_campaign, SimpleNamespace(shots=counted))
-    notes = correlated_noise(*campaigns)
-    assert len(notes) == (correlation > 0.0 and stated is None)
-    for note in notes:
-        told = re.search(r"position scatters by (\S+) µm, .* State noise_std_m of sensors: position", note)
-        assert told
-        assert float(told[1]) == pytest.approx(1.5, rel=0.1)
+    found = noise_at_rest(*campaigns)
+    assert set(found) == ({"position"} if correlation > 0.0 and stated is None else set())
+    for one in found.values():
+        assert one.std == pytest.approx(1.5e-6, rel=0.05)
+        assert one.where == "before contact"
 
 
 @pytest.mark.parametrize(
@@ -154,15 +154,65 @@ def test_noise_after_the_tap_tells_where_nothing_was_recorded_before_it(
         last = 1000 if noise == "moving" else 600
         values += 4e-3 * (1.0 - np.clip(1.0 - np.arange(1000) / last, 0.0, None) ** 2)
         channel = SimpleNamespace(values=values, noise_std=None)
-        shots.append(SimpleNamespace(force=None, position=channel))
+        shots.append(SimpleNamespace(force=None, position=channel, actuator=None))
     excitation = Excitation.DRIVEN if noise == "driven" else Excitation.TAP
     campaign: Any = SimpleNamespace(shots=shots, excitation=excitation)
-    notes = correlated_noise(campaign, campaign)
-    assert len(notes) == (told is not None)
-    for note in notes:
-        found = re.search(r"At rest after the tap position scatters by (\S+) µm", note)
-        assert found
-        assert float(found[1]) == pytest.approx(told, rel=0.15)
+    found = noise_at_rest(campaign, campaign)
+    assert set(found) == ({"position"} if told else set())
+    for one in found.values():
+        assert one.std == pytest.approx(1e-6 * (told or 0.0), rel=0.06)
+        assert one.where == "after the tap"
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
+@pytest.mark.parametrize("size", [40, 300])
+def test_short_pieces_show_all_of_correlated_noise(correlation: float, size: int) -> None:
+    """About a level of its own a piece of 40 samples shows 0.79 of the standard deviation at 0.9."""
+    rng = np.random.default_rng(int(100 * correlation) + size)
+    estimates = []
+    for _ in range(40):
+        values = rng.normal(size=(30, size))
+        for i in range(1, size):
+            values[:, i] *= math.sqrt(1.0 - correlation**2)
+            values[:, i] += correlation * values[:, i - 1]
+        estimates.append(std_of_pieces([row + 10.0 * rng.normal() for row in values]))
+    assert np.mean(estimates) == pytest.approx(1.0, abs=0.03)
+    assert np.std(estimates) < 0.1
+
+
+def test_the_floor_is_that_at_rest_where_neighbouring_samples_show_a_part() -> None:
+    rng = np.random.default_rng(8)
+    values = (rng.normal(0.0, 0.3, 200), rng.normal(0.0, 1e-6, 200), np.empty(0))
+    prepared: Any = SimpleNamespace(
+        shots=(SimpleNamespace(values=values),),
+        stated_noise=(math.nan,) * 3,
+        noise_at_rest={"force": NoiseAtRest(0.9, 3.0, "after the tap")},
+    )
+    floor = sensor_noise(prepared)
+    assert floor.noise_std[0] == 0.9
+    assert floor.noise_std[1] == pytest.approx(1e-6, rel=0.2)
+    assert floor.source == ("estimated", "estimated", "none")
+    assert "0.9 N was estimated from samples at rest after the tap, 3 times what neighb" in floor.notes[0]
+    assert "state noise_std_n of sensors: force in campaign.yaml" in floor.notes[0]
+    assert "from neighbouring samples" in floor.notes[1]
+
+
+def test_correlated_noise_that_nobody_stated_is_no_gap() -> None:
+    """Against what neighbouring samples show it had been a gap of 1.7 noise floors, and `unknown`."""
+
+    def unstated(shot: Capture) -> Capture:
+        channels = {
+            name: replace(channel, noise_std=None)
+            for name in ("force", "position", "actuator")
+            if (channel := getattr(shot, name)) is not None
+        }
+        return replace(shot, **channels)
+
+    job = Job("none", (), 5_061_000, shots=30, coloured=True)
+    given = campaign(job)
+    found = name_effects(replace(given, shots=tuple(map(unstated, given.shots))), seed=job.seed)
+    assert found.conclusion.verdict == "no_gap"
+    assert found.floor.noise_std == pytest.approx(prepare(given).stated_noise, rel=0.15)
 
 
 @pytest.mark.parametrize(

@@ -200,20 +200,20 @@ def test_the_equation_of_a_law_of_taps_is_all_german_and_its_numbers_are_short(c
                     "geschätzt, eine untere Schranke, wo es korreliert ist.")),
         ),
         (
-            ("At rest before contact position scatters by 1.55 µm, 2.4 times what neighbouring samples "
-             "show: ... State noise_std_m of sensors: position in campaign.yaml, and run again."),
-            ("de", ("In Ruhe vor dem Kontakt streut ein Messwert um 1,55 µm (Position), das "
-                    "2,4-Fache dessen, was benachbarte zeigen: das Rauschen ist korreliert oder hat "
-                    "Ausreißer, und eine Abweichung dieser Größe kann die des Sensors sein. noise_std_m "
-                    "unter sensors: position in campaign.yaml angeben und neu rechnen.")),
+            ("The noise of position is not stated; 1.55 µm was estimated from samples at rest before "
+             "contact, 2.4 times what neighbouring samples show: ... state noise_std_m of sensors: ..."),
+            ("de", ("Das Rauschen (Position) ist nicht angegeben; 1,55 µm ist aus Messwerten in Ruhe vor "
+                    "dem Kontakt geschätzt, das 2,4-Fache dessen, was benachbarte zeigen: es ist korreliert "
+                    "oder hat Ausreißer. Was sich in Ruhe bewegt, zählt als Rauschen: noise_std_m unter "
+                    "sensors: position in campaign.yaml angeben, wenn es bekannt ist.")),
         ),
         (
-            ("At rest after the tap force scatters by 0.62 N, 1.5 times what neighbouring samples show: ... "
-             "State noise_std_n of sensors: force in campaign.yaml, and run again."),
-            ("de", ("In Ruhe nach dem Stoß streut ein Messwert um 0,62 N (Kraft), das 1,5-Fache dessen, was "
-                    "benachbarte zeigen: das Rauschen ist korreliert oder hat Ausreißer, und eine Abweichung "
-                    "dieser Größe kann die des Sensors sein. noise_std_n unter sensors: force in "
-                    "campaign.yaml angeben und neu rechnen.")),
+            ("The noise of force is not stated; 0.62 N was estimated from samples at rest after the tap, 1.5 "
+             "times what neighbouring samples show: ... state noise_std_n of sensors: force in ..."),
+            ("de", ("Das Rauschen (Kraft) ist nicht angegeben; 0,62 N ist aus Messwerten in Ruhe nach dem "
+                    "Stoß geschätzt, das 1,5-Fache dessen, was benachbarte zeigen: es ist korreliert oder "
+                    "hat Ausreißer. Was sich in Ruhe bewegt, zählt als Rauschen: noise_std_n unter sensors: "
+                    "force in campaign.yaml angeben, wenn es bekannt ist.")),
         ),
         ("Shot 7 has a gap in time; what happened in it is lost.",
          ("de", "Stoß 7 hat eine Lücke in der Zeit; was darin geschah, ist verloren.")),

@@ -1,68 +1,123 @@
 """What samples at rest say of the noise: all of it, where neighbouring ones show a part."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from impactcell.campaign import Campaign, Excitation
+from impactcell.discrepancy.data.prepared_shots import CHANNELS
 from impactcell.features import white_noise_std
 from impactcell.records import Samples
 
-TOLD_IN = {"force": (1.0, "N", "noise_std_n"), "position": (1e6, "µm", "noise_std_m")}
-"""Channels at rest before contact and after the tap: what their noise is told in, its key in the YAML."""
-FEWEST_SAMPLES = 30
-"""Of a shot before contact; the standard deviation of as many is good to 13 %."""
+MOVES_BEFORE_CONTACT = "actuator"
+"""Channel that has no one value then; after its stroke it has."""
 LAST_SAMPLES = 3
 """Samples before contact that are left out: contact lies within a sampling step."""
-TAIL_SAMPLES = 150
-"""Last samples of a shot in which the part has to lie still for any of them to be used: 15 ms at 10 kHz."""
+TAIL_SAMPLES = 40
+"""Last samples of a shot in which the part has to lie still for any of them to be used."""
+BLOCK_SAMPLES, NEAR, DOUBTED_BLOCKS = 20, 3.0, 2
+"""Earlier ones are taken in blocks, as long as their mean is that of the tail to so many of its standard
+deviations; in the earliest two of them the part may still have moved, and they are left out."""
 STILL_RATIO = 1.5
-"""Scatter of these over that of their last half, up to which it lies still: 2 or more where it moves on."""
-CERTAIN_EXCESS = 2.0
-"""Excess of the scatter at rest over that of neighbouring samples from which on it is told, times the root of
-the samples of a shot: white noise in 24 shots made 1.4 at most in 180 draws (0.25 with 30, 0.06 with 400)."""
+"""Scatter of the tail over that of its last half, up to which it lies still: 2 or more where it moves on."""
+USUAL_RATIO = 4.0
+"""Scatter of a shot over the median from which on it counts no more: a spike, or a part that moved; what has
+heavy tails comes to 3."""
+MIN_SHARE = 0.5
+"""Of the shots, which must show rest."""
+MIN_EXCESS, CERTAIN_EXCESS = 0.05, 4.0
+"""Excess of the scatter at rest over that of neighbouring samples from which on it counts: at least, and by
+the root of the samples. White noise exceeded it in 1 to 2 % of 300 draws (4 to 60 shots of 40 samples, 24 of
+300), and then it is as good an estimate."""
+BISECTIONS = 50
+"""Halvings of the interval in which the correlation of neighbouring samples lies."""
 
 
-def correlated_noise(recorded: Campaign, counted: Campaign) -> list[str]:
-    """Say of which channels whose noise is not stated it is larger than neighbouring samples show.
+@dataclass(frozen=True, slots=True)
+class NoiseAtRest:
+    """Noise of a channel as it shows at rest.
 
-    Both are the median over the shots, so that neither spikes nor a few shots decide. Taps rest before
-    contact, and where they were not recorded there after they have slid.
+    Attributes
+    ----------
+    std : float
+        Of one sample, in the unit of the channel.
+    ratio : float
+        Of it to what neighbouring samples show.
+    where : str
+        `before contact` or `after the tap`.
+    """
+
+    std: float
+    ratio: float
+    where: str
+
+
+def noise_at_rest(recorded: Campaign, counted: Campaign) -> Mapping[str, NoiseAtRest]:
+    """Find channels whose noise is not stated, and correlated or with outliers: more than neighbours show.
+
+    Taps rest before contact, and where they were not recorded there after they have slid.
 
     Parameters
     ----------
     recorded, counted : Campaign
         Of taps with the samples before contact, and what `from_contact` makes of it.
     """
-    notes = []
-    for channel, (scale, unit, key) in TOLD_IN.items():
+    found = {}
+    for channel in CHANNELS:
         where, resting = "before contact", list(_before_contact(recorded, counted, channel))
         if not resting and recorded.excitation is Excitation.TAP:
             where, resting = "after the tap", list(_after_the_tap(counted, channel))
-        if not resting:
+        if len(resting) < MIN_SHARE * len(counted.shots):
             continue
-        scatter = float(np.median([values.std(ddof=1) for values in resting]))
+        std = std_of_pieces(resting)
         white = float(np.median([white_noise_std(values) for values in resting]))
-        excess = CERTAIN_EXCESS / math.sqrt(np.median([len(values) for values in resting]))
-        if scatter > (1.0 + excess) * white > 0.0:
-            notes.append(
-                f"At rest {where} {channel} scatters by {scale * scatter:.3g} {unit}, "
-                f"{scatter / white:.3g} times what neighbouring samples show: its noise is correlated or has "
-                f"outliers, and a gap of as much may be the sensor's. State {key} of sensors: {channel} in "
-                "campaign.yaml, and run again."
-            )
-    return notes
+        excess = max(CERTAIN_EXCESS / math.sqrt(sum(map(len, resting))), MIN_EXCESS)
+        if std > (1.0 + excess) * white > 0.0:
+            found[channel] = NoiseAtRest(std, std / white, where)
+    return found
+
+
+def std_of_pieces(pieces: list[Samples]) -> float:
+    """Give the standard deviation of noise that is seen in short pieces, each about a level of its own.
+
+    The mean of n correlated samples follows them, and what is left about it is too small. For noise of first
+    order, of which neighbours correlate by rho, the mean square about the mean is sigma^2 (1 - v), and the
+    mean product of neighbours sigma^2 (rho - v) but for terms of order 1/n, with v n^2 = sum_ij rho^|i-j|,
+    the variance of the mean over sigma^2 (Bartlett 1946). Their ratio gives rho, and rho gives sigma.
+    """
+    stds = np.array([values.std() for values in pieces])
+    usual = [piece for piece, std in zip(pieces, stds, strict=True) if std <= USUAL_RATIO * np.median(stds)]
+    centred = [values - values.mean() for values in usual]
+    square = sum(float(values @ values) for values in centred) / sum(map(len, centred))
+    product = sum(float(values[1:] @ values[:-1]) for values in centred)
+    ratio = product / sum(len(values) - 1 for values in centred) / square
+    size = int(np.median([len(values) for values in centred]))
+    low, high = 0.0, 1.0 - 1.0 / size
+    for _ in range(BISECTIONS):
+        rho = 0.5 * (low + high)
+        v = _variance_of_mean(rho, size)
+        low, high = (rho, high) if (rho - v) / (1.0 - v) < ratio else (low, rho)
+    return math.sqrt(square / (1.0 - _variance_of_mean(low, size)))
+
+
+def _variance_of_mean(rho: float, size: int) -> float:
+    """Variance of the mean of so many samples of noise of first order, over that of one."""
+    lags = np.arange(1, size)
+    return float(1.0 + 2.0 * np.sum((1.0 - lags / size) * rho**lags)) / size
 
 
 def _before_contact(recorded: Campaign, counted: Campaign, name: str) -> Iterator[Samples]:
+    if name == MOVES_BEFORE_CONTACT:
+        return
     for before, after in zip(recorded.shots, counted.shots, strict=True):
         whole, kept = getattr(before, name), getattr(after, name)
         if whole is None or kept is None or whole.noise_std is not None:
             continue
         values = whole.values[: max(len(whole.values) - len(kept.values) - LAST_SAMPLES, 0)]
         values = values[np.isfinite(values)]
-        if len(values) >= FEWEST_SAMPLES:
+        if len(values) >= TAIL_SAMPLES:
             yield values
 
 
@@ -77,7 +132,8 @@ def _after_the_tap(counted: Campaign, name: str) -> Iterator[Samples]:
         scatter = float(tail[len(tail) // 2 :].std()) if len(tail) == TAIL_SAMPLES else 0.0
         if not 0.0 < float(tail.std()) <= STILL_RATIO * scatter:
             continue
-        blocks = values[len(values) % TAIL_SAMPLES :].reshape(-1, TAIL_SAMPLES)
-        near = np.abs(blocks.mean(1) - tail.mean()) <= scatter
+        earlier = values[: len(values) - TAIL_SAMPLES]
+        blocks = earlier[len(earlier) % BLOCK_SAMPLES :].reshape(-1, BLOCK_SAMPLES)
+        near = np.abs(blocks.mean(1) - tail.mean()) <= NEAR * float(tail.std())
         still = int(np.argmin(near[::-1])) if not near.all() else len(blocks)
-        yield values[len(values) - max(still, 1) * TAIL_SAMPLES :]
+        yield values[len(values) - TAIL_SAMPLES - max(still - DOUBTED_BLOCKS, 0) * BLOCK_SAMPLES :]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from impactcell.discrepancy.data.noise_at_rest import NoiseAtRest
 from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign
 from impactcell.discrepancy.data.prepared_shots import CHANNELS, IndexArray, PreparedShot
 from impactcell.errors import CampaignError
@@ -19,8 +20,8 @@ MIN_DEGREES_OF_FREEDOM = 3
 """Fewer degrees of freedom give no spread of replicates: it would be uncertain by half."""
 MIN_REPLICATE_SPREAD = 1e-9
 """Smallest spread of replicates, so that equal factors divide nothing by zero."""
-TOLD_IN = ((1.0, "N"), (1e6, "µm"), (1e6, "µm"))
-"""What the noise of each channel is told in: how many of a unit there are in one of SI."""
+TOLD_IN = ((1.0, "N", "noise_std_n"), (1e6, "µm", "noise_std_m"), (1e6, "µm", "noise_std_m"))
+"""What the noise of each channel is told in: how many of a unit are one of SI, the unit, its key in YAML."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +43,7 @@ class NoiseFloor:
 
 
 def sensor_noise(prepared: PreparedCampaign) -> NoiseFloor:
-    """Noise of each channel: as stated, else from third differences of neighbouring samples.
+    """Noise of each channel: as stated, else of samples at rest, or from third differences of neighbours.
 
     Raises
     ------
@@ -67,12 +68,9 @@ def sensor_noise(prepared: PreparedCampaign) -> NoiseFloor:
                     "state it in campaign.yaml"
                 )
                 raise CampaignError(message)
-            scale, unit = TOLD_IN[channel]
-            notes.append(
-                f"The noise of {name} is not stated; {scale * estimate:.3g} {unit} was estimated from "
-                "neighbouring samples, which is a lower bound where noise is correlated."
-            )
-            stds.append(estimate)
+            resting = prepared.noise_at_rest.get(name)
+            stds.append(resting.std if resting else estimate)
+            notes.append(_of_samples(channel, stds[-1], resting))
             sources.append("estimated")
             continue
         if estimate > NOISE_UNIT_FACTOR * stated or 0.0 < estimate < stated / NOISE_UNIT_FACTOR**1.5:
@@ -85,6 +83,19 @@ def sensor_noise(prepared: PreparedCampaign) -> NoiseFloor:
         stds.append(stated)
         sources.append("stated")
     return NoiseFloor((stds[0], stds[1], stds[2]), (sources[0], sources[1], sources[2]), tuple(notes))
+
+
+def _of_samples(channel: int, std: float, resting: NoiseAtRest | None) -> str:
+    """Say where the noise of a channel comes from that is not stated."""
+    name, (scale, unit, key) = CHANNELS[channel], TOLD_IN[channel]
+    said = f"The noise of {name} is not stated; {scale * std:.3g} {unit} was estimated from "
+    if resting is None:
+        return said + "neighbouring samples, which is a lower bound where noise is correlated."
+    return said + (
+        f"samples at rest {resting.where}, {resting.ratio:.3g} times what neighbouring samples show: it is "
+        f"correlated or has outliers. What moves at rest counts as noise: state {key} of sensors: {name} in "
+        "campaign.yaml if it is known."
+    )
 
 
 def white_noise(shots: tuple[PreparedShot, ...], channel: int) -> float:

@@ -5,7 +5,7 @@ test that follows.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from impactcell.campaign import Campaign, Coordinate, Excitation, from_contact
 from impactcell.discrepancy.data.driven import Driven
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.free_slide import FreeSlide
-from impactcell.discrepancy.data.noise_at_rest import correlated_noise
+from impactcell.discrepancy.data.noise_at_rest import NoiseAtRest, noise_at_rest
 from impactcell.discrepancy.data.prepared_shots import (
     POSITION,
     IndexArray,
@@ -58,6 +58,8 @@ class PreparedCampaign:
         Names of the covariates that vary: `OWN_COVARIATES` first, then further columns of `shots.csv`.
     stated_noise : tuple of float
         Of force, position and actuator as stated, with what a coarse raster adds; nan where nothing is.
+    noise_at_rest : mapping
+        Of channels whose noise is not stated and is more than neighbouring samples show.
     notes : tuple of str
         What the data lack and what that costs; part of the report.
     """
@@ -69,6 +71,7 @@ class PreparedCampaign:
     batches: tuple[str, ...]
     covariates: tuple[str, ...]
     stated_noise: tuple[float, float, float]
+    noise_at_rest: Mapping[str, NoiseAtRest]
     notes: tuple[str, ...]
 
 
@@ -85,7 +88,7 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     campaign, pretrigger = from_contact(whole)
     data_faults = inspect_campaign(campaign)
     refuse_unusable(campaign, data_faults)
-    notes = [*pretrigger, *correlated_noise(whole, campaign), *notes_of(data_faults)]
+    notes = [*pretrigger, *notes_of(data_faults)]
     captures = strategy.cut(campaign, notes)
     if len(captures) < MIN_SHOTS:
         message = (
@@ -118,6 +121,7 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
             _stated_noise(campaign.shots, "position"),
             _stated_noise(campaign.shots, "actuator"),
         ),
+        noise_at_rest(whole, campaign),
         tuple(notes),
     )
 

@@ -70,14 +70,14 @@ AT_REST: Final = {"before contact": "vor dem Kontakt", "after the tap": "nach de
 """When a part lies still."""
 NOTES: Final[Patterns] = (
     (r"Data, ([^:]+): (?:shot (\d+): )?(.*?)(?:; the like in (\d+) more shots)?\.", _data_fault),
-    (r"The noise of (\w+) is not stated; (\S+(?: \S+)?) was estimated .*",
+    (r"The noise of (\w+) is not stated; (\S+ \S+) was .* at rest ([^,]+), (\S+) times .* state (\w+) of .*",
+     lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus Messwerten in Ruhe "
+     f"{AT_REST[m[3]]} geschätzt, das {m[4]}-Fache dessen, was benachbarte zeigen: es ist korreliert "
+     "oder hat Ausreißer. Was sich in Ruhe bewegt, zählt als Rauschen: "
+     f"{m[5]} unter sensors: {m[1]} in campaign.yaml angeben, wenn es bekannt ist."),
+    (r"The noise of (\w+) is not stated; (\S+(?: \S+)?) was estimated from neigh.*",
      lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus benachbarten Messwerten "
      "geschätzt, eine untere Schranke, wo es korreliert ist."),
-    (r"At rest (before contact|after the tap) (\w+) scatters by (\S+ \S+), (\S+) times .* State (\w+) of .*",
-     lambda m: f"In Ruhe {AT_REST[m[1]]} streut ein Messwert um {m[3]} ({phrase(m[2])}), das {m[4]}-Fache "
-     "dessen, was benachbarte zeigen: das Rauschen ist korreliert oder hat Ausreißer, und eine Abweichung "
-     f"dieser Größe kann die des Sensors sein. {m[5]} unter sensors: {m[2]} in campaign.yaml angeben und neu "
-     "rechnen."),
     (r"First contact lies (\S+) to (\S+) µs from t = 0, .*",
      (r"Der erste Kontakt liegt \1 bis \2 µs von t = 0, innerhalb eines Abtastschritts: "
       "er wird Stoß für Stoß angepasst.")),
