@@ -16,7 +16,7 @@ from impactcell.prediction import Model, calibrate, estimate_from_features
 from impactcell.prediction.joint_plant_fit import estimate_mass, fit_plant
 from impactcell.process.console import print_note
 from impactcell.process.progress import progress
-from impactcell.records import Capture, Channel, FrictionEstimate, Samples, with_open_onset
+from impactcell.records import Capture, Channel, FrictionEstimate, Samples, as_recorded
 
 FRICTIONS = 9
 """Values of mu_s that are swept for each mass of a campaign: three times the coefficients of (4) and (5)."""
@@ -98,7 +98,7 @@ def estimate(
         position=_channel(time, position),
         stroke_m=stroke_m,
     )
-    features = extract(with_open_onset(capture))
+    features = extract(as_recorded(capture))
     if model is not None:
         from impactcell.settings.model_file import read_model
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-from impactcell.records import BatchAnnouncement, Capture, Channel, FrictionEstimate, Quality, with_open_onset
+from impactcell.records import BatchAnnouncement, Capture, Channel, FrictionEstimate, Quality, as_recorded
 
 PERIOD_GAIN = 0.05
 """Share of the latest time between cycles in their mean."""
@@ -65,7 +65,7 @@ def fill_defaults(defaults: CaptureDefaults, capture: Capture) -> Capture:
     if math.isinf(stroke_m) and defaults.stroke_m is not None:
         stroke_m = defaults.stroke_m
     return replace(
-        with_open_onset(capture),
+        as_recorded(capture),
         mass_kg=mass_kg,
         stroke_m=stroke_m,
         force=_with_noise(capture.force, defaults.force_noise_std_n),

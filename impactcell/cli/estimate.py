@@ -6,6 +6,7 @@ import json
 import math
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
@@ -22,7 +23,7 @@ from impactcell.process.console import print_note, print_result
 from impactcell.process.progress import progress
 from impactcell.process.whole_files import write_whole
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
-from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, with_open_onset
+from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, as_recorded
 
 COLUMNS = (
     "shot", "mu_s_force", "mu_s_distance", "mu_s_combined", "mu_s", "mu_s_std", "mu_k", "mu_k_std",
@@ -75,7 +76,7 @@ def estimate(
             (shot.cycle, _of_free_slide(shot, campaign_data.gravity_m_s2)) for shot in campaign_data.shots
         ]
     else:
-        taps = with_masses([extract(with_open_onset(shot)) for shot in campaign_data.shots])
+        taps = with_masses([extract(shot) for shot in campaign_data.shots])
         rows = _of_taps(campaign_data, taps, cell)
     if as_json:
         sys.stdout.write(_as_json(rows))
@@ -105,6 +106,7 @@ def _of_taps(
         from impactcell.settings import read_cell
 
         plant = read_cell(cell).model
+        taps = [replace(tap, capture=as_recorded(tap.capture)) for tap in taps]
     else:
         with progress("fitting the plant", 1):
             fitted, taps = fit_plant_and_onset(taps, campaign.gravity_m_s2)

@@ -124,10 +124,13 @@ class Ensemble:
         friction_factor: Samples | float,
         mass_kg: Samples | None,
         initial_speed_m_s: Samples | None,
+        velocity_m_s: Samples | None = None,
     ) -> Samples:
         taps = self._columns
         if mass_kg is not None:
             taps = {**taps, "mass_kg": mass_kg}
+        if velocity_m_s is not None:
+            taps = {**taps, "velocity_m_s": velocity_m_s}
         if initial_speed_m_s is not None:
             taps = {**taps, "initial_speed_m_s": initial_speed_m_s}
         rows, shape = np.asarray(values, np.float64), (self._count, len(self.names))
@@ -144,6 +147,7 @@ class Ensemble:
         friction_factor: Samples | float = 1.0,
         *,
         mass_kg: Samples | None = None,
+        velocity_m_s: Samples | None = None,
         initial_speed_m_s: Samples | None = None,
         onset_s: Samples | None = None,
     ) -> Traces:
@@ -155,14 +159,13 @@ class Ensemble:
             Shape (len(names),), or (n, len(names)) for a vector a tap. No ranges are checked.
         friction_factor : float or ndarray of shape (n,)
             Multiplies mu_s and mu_k of each shot.
-        mass_kg, initial_speed_m_s : ndarray of shape (n,), optional
+        mass_kg, velocity_m_s, initial_speed_m_s : ndarray of shape (n,), optional
             Instead of the taps' own.
         onset_s : ndarray of shape (n,), optional
             When first contact was, as for `samples`.
         """
-        out = self.samples(
-            values, friction_factor, mass_kg=mass_kg, initial_speed_m_s=initial_speed_m_s, onset_s=onset_s
-        )
+        parameters = self._tap_parameters(values, friction_factor, mass_kg, initial_speed_m_s, velocity_m_s)
+        out = self._sample(parameters, onset_s)
         return self._split(out)
 
     def samples(

@@ -14,7 +14,7 @@ from impactcell.prediction.block_averaging import (
     POSITION_BLOCK_S,
     average_blocks,
 )
-from impactcell.prediction.linearised_model import LATEST_ONSET, LinearisedModel
+from impactcell.prediction.linearised_model import LATEST_ONSET, LinearisedModel, RecorderStd
 from impactcell.records import Capture, Samples
 
 KINK_SPAN_S = 1.5e-4
@@ -39,6 +39,11 @@ def tap_input(capture: Capture) -> TapInput:
     )
 
 
+def recorder_std_of(capture: Capture) -> RecorderStd:
+    """Give the standard deviations of what a record does not tell exactly."""
+    return capture.onset_std_s, capture.mass_std, capture.velocity_std, capture.force_scale_std
+
+
 def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
     """Average a capture over blocks, fine where `plant` has its events and contact was lost.
 
@@ -54,7 +59,8 @@ def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
     PredictionError, PhysicsError
         The capture does not show its slide, or the plant has no motion.
     """
-    tap, onset_std_s = tap_input(features.capture), features.capture.onset_std_s
+    tap, recorder_std = tap_input(features.capture), recorder_std_of(features.capture)
+    onset_std_s, *_ = recorder_std
     motion = simulate_tap(plant, tap)
     kinks = [*(event.time_s for event in motion.events), required(features.separation).value]
     spans = [(time - KINK_SPAN_S, time + KINK_SPAN_S) for time in kinks]
@@ -69,7 +75,7 @@ def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
         force = replace(force, std=force.std * factors)
     moved = _surely_touching(required(features.position), onset_std_s)
     position = average_blocks(moved, POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
-    return LinearisedModel(plant, tap, force, position, onset_std_s)
+    return LinearisedModel(plant, tap, force, position, recorder_std)
 
 
 def _surely_touching(channel: CheckedChannel, onset_std_s: float) -> CheckedChannel:

@@ -5,14 +5,13 @@ part which sticks for longer, and of a light part mu_s comes out twice as large,
 """
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import replace
 
-from impactcell.errors import NotConvergedError, PredictionError
+from impactcell.errors import NotConvergedError
 from impactcell.features import Features
 from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.prediction.plant_fit import PlantFit
-from impactcell.records import Capture, sampling_step_s, with_open_onset
+from impactcell.records import Capture, as_recorded, sampling_step_s, with_open_onset
 
 ONSET_STD_S = 5e-5
 """Standard deviation of first contact about t = 0 that is tried [s]: triggers are late by tens of µs."""
@@ -27,39 +26,47 @@ def fit_plant_and_onset(
 ) -> tuple[PlantFit, Sequence[Features]]:
     """Fit the plant with each tap's moment of contact: within a step, or farther if that explains the taps.
 
+    Mass, velocity and scale of the force are known so well only, and no better where that explains the taps.
+
     Returns
     -------
     fit : PlantFit
     taps : sequence of Features
-        As they were fitted: `onset_std_s` of their captures says how far contact was looked for.
+        As they were fitted: their captures say what was known of contact, mass, velocity and scale.
 
     Raises
     ------
     PredictionError
         As `fit_plant`.
     """
-    taps = [_told(tap, with_open_onset(tap.capture)) for tap in taps]
-    fit: PlantFit | None = None
-    fault: NotConvergedError | None = None
-    try:
-        fit = fit_plant(taps, gravity_m_s2, name)
-    except NotConvergedError as found:
-        fault = found
+    measured = [_told(tap, as_recorded(tap.capture)) for tap in taps]
+    fit, fault = _fitted(measured, gravity_m_s2, name)
     if fit is not None and fit.gap**2 <= 1.0 + MIN_FALL:
-        return fit, taps
+        return fit, measured
+    # What no mass, velocity or scale explains is the model's fault, and they would follow it.
+    exact = [_told(tap, with_open_onset(tap.capture)) for tap in taps]
+    fit, fault = _fitted(exact, gravity_m_s2, name)
     later = [
         _told(tap, replace(tap.capture, onset_std_s=max(tap.capture.onset_std_s, ONSET_STD_S)))
-        for tap in taps
+        for tap in measured
     ]
-    other: PlantFit | None = None
-    with suppress(PredictionError):  # then the first fit stands, or its fault
-        other = fit_plant(later, gravity_m_s2, name)
+    other, _ = _fitted(later, gravity_m_s2, name)
     falls = other is not None and (fit is None or fit.gap**2 - other.gap**2 > MIN_FALL)
     if other is not None and falls and other.gap < GAP_ENOUGH:
         return other, later
     if fit is None:
         raise fault or NotConvergedError("the plant could not be fitted to the campaign")
-    return fit, taps
+    return fit, exact
+
+
+def _fitted(
+    taps: Sequence[Features], gravity_m_s2: float, name: str
+) -> tuple[PlantFit | None, NotConvergedError | None]:
+    """Fit the plant, or give the fault for which it cannot be."""
+    try:
+        return fit_plant(taps, gravity_m_s2, name), None
+    except NotConvergedError as fault:
+        return None, fault
 
 
 def _told(tap: Features, capture: Capture) -> Features:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from impactcell.errors import NotConvergedError, PredictionError
 from impactcell.features import Fault, Features, MeasuredFeature, SlideFeatures, extract
 from impactcell.prediction.equations import beyond_calibration, by_distance, by_force, combined, out_of_range
+from impactcell.prediction.linearised_model import FORCE_SCALE, MASS, PARAMETERS, VELOCITY
 from impactcell.prediction.mass_interpolation import interpolate_mass
 from impactcell.prediction.model import Model
 from impactcell.prediction.phase_reweighting import MISFIT_THRESHOLD
@@ -15,6 +16,10 @@ from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate
 NO_FEATURE = MeasuredFeature(math.nan, math.nan)
 SUMMARY_RELATIVE_STD = 0.01
 """Relative standard deviation of what the module reports without one: our choice, for it says nothing."""
+MAX_DEVIATION = 3.0
+"""Standard deviations by which what was told may be off: 3 % of mass and scale, 1.5 % of velocity."""
+MM_PER_MIN = 60_000.0
+"""Millimetres per minute in a metre per second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +129,7 @@ def _from_waveform(
     model: Model, capture: Capture, waveform: WaveformFit
 ) -> tuple[Coefficient, Coefficient, float]:
     """Coefficients as published, with a warning for a tap outside the calibration or unlike the model."""
-    warnings = [beyond_calibration(model, capture, waveform.mu_s)]
+    warnings = [beyond_calibration(model, capture, waveform.mu_s), *_told_otherwise(capture, waveform)]
     if waveform.misfit > MISFIT_THRESHOLD:
         warnings.append(
             f"residuals are {waveform.gap:.3g} times the sensors' noise: the model lacks something"
@@ -134,6 +139,25 @@ def _from_waveform(
     mu_s = Coefficient(waveform.mu_s, waveform.mu_s_std, Quality.GOOD, reason)
     mu_k = Coefficient(waveform.mu_k, waveform.mu_k_std, Quality.GOOD)
     return _with_warnings(mu_s, *warnings), _with_warnings(mu_k, *warnings), waveform.gap
+
+
+def _told_otherwise(capture: Capture, waveform: WaveformFit) -> list[str]:
+    """Name the mass, the velocity or the scale of the force that the tap shows, where it is not as told."""
+    if len(waveform.theta) == PARAMETERS:
+        return []
+    off = waveform.theta
+    said = []
+    if abs(off[MASS]) > MAX_DEVIATION:
+        mass_kg = capture.mass_kg * math.exp(capture.mass_std * off[MASS])
+        said.append(f"the tap is that of {mass_kg:.4g} kg, not {capture.mass_kg:.4g} kg: check the mass")
+    if abs(off[VELOCITY]) > MAX_DEVIATION:
+        told = MM_PER_MIN * capture.velocity_m_s
+        shown = told * math.exp(capture.velocity_std * off[VELOCITY])
+        said.append(f"the tap is that of {shown:.0f} mm/min, not {told:.0f} mm/min: check the velocity")
+    if abs(off[FORCE_SCALE]) > MAX_DEVIATION:
+        scale = math.exp(capture.force_scale_std * off[FORCE_SCALE])
+        said.append(f"the force is {scale:.3f} times that of the model: check its scale")
+    return said
 
 
 def _peak_force(features: Features) -> tuple[MeasuredFeature, str]:

@@ -1,9 +1,10 @@
 """What the model says a capture should be: blocks of force and position for given parameters, and residuals.
 
 theta = ln(mu_k, mu_k / mu_s, k, b), with stiffness k [N/m] and damping b [N s/m] of the contact. Steps in it
-are relative, whatever the units. Where the recorder does not tell first contact, theta has its moment as
-well, in standard deviations of what is known of it. z (`kink_coordinate`) says whether the part sticks before
-it moves; at z = 0 (the kink) the response to theta has a bend.
+are relative, whatever the units. Of a tap that was measured, theta has what nobody knows exactly as well, in
+standard deviations from what is known of it: the moment of first contact, ln m, ln v and the logarithm of the
+force sensor's scale. z (`kink_coordinate`) says whether the part sticks before it moves; at z = 0 (the kink)
+the response to theta has a bend.
 """
 
 import math
@@ -18,25 +19,32 @@ from impactcell.physics import Ensemble, Plant, TapInput
 from impactcell.prediction.block_averaging import BlockMeans
 from impactcell.records import Samples
 
-MU_K, RATIO, STIFFNESS, DAMPING, ONSET = range(5)
+MU_K, RATIO, STIFFNESS, DAMPING, ONSET, MASS, VELOCITY, FORCE_SCALE = range(8)
 """Places in theta."""
-PARAMETERS = 4
-"""Length of theta without the moment of first contact."""
+PARAMETERS, WITH_RECORDER = 4, 8
+"""Length of theta without what nobody knows of a record exactly, and with it."""
+RecorderStd = tuple[float, float, float, float]
+"""Standard deviations of first contact [s], and relative ones of mass, velocity and the force's scale."""
 JUST_STICKING = 1e-7
 """z above which the model is that of a part that sticks first (see above)."""
-STEP_SENSES = np.array([1.0, -1.0, 1.0, -1.0, 1.0])
+STEP_SENSES = np.array([1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
 """Senses of small steps in theta that do not make a part slip that sticks."""
 RELATIVE_STEP = 1e-5
 """Step of a difference in theta: small against the noise, large against rounding. Our choice."""
-ONSET_STEP = 1e-3
-"""The same of first contact, in its standard deviations. Our choice."""
+RECORDER_STEP = 1e-3
+"""The same of what is known of a record only so well, in its standard deviations. Our choice."""
 LATEST_ONSET = 2.0
 """How far from t = 0 first contact may lie, in its standard deviations: a sampling step."""
-STEPS_OUT = STEP_SENSES * np.array([*[RELATIVE_STEP] * PARAMETERS, ONSET_STEP])
-STEPS = np.vstack([np.zeros(PARAMETERS), np.diag(STEPS_OUT[:PARAMETERS]), np.zeros(PARAMETERS)])
-"""Of the parameters of the plant, in each of the copies of a tap that are integrated, shape (6, 4)."""
-ONSET_STEPS = ONSET_STEP * np.eye(1, ONSET + 2, ONSET + 1)[0]
-"""Of first contact, in each of the copies, shape (6,)."""
+FARTHEST = np.array([LATEST_ONSET, 10.0, 10.0, 10.0])
+"""How far what is known of a record only so well may lie from that, in standard deviations."""
+STEPS_OUT = STEP_SENSES * np.repeat([RELATIVE_STEP, RECORDER_STEP], [PARAMETERS, WITH_RECORDER - PARAMETERS])
+STEPS = np.vstack([np.zeros(WITH_RECORDER), np.diag(STEPS_OUT)])
+"""Of theta, in each of the copies of a tap, shape (9, 8); the last is integrated with the first."""
+
+
+def parameter_count(recorder_std: RecorderStd) -> int:
+    """Length of theta: of a tap of which all is known exactly, or of one that was measured."""
+    return WITH_RECORDER if any(recorder_std) else PARAMETERS
 
 
 def with_parameters(plant: Plant, theta: Samples) -> Plant:
@@ -84,8 +92,8 @@ class LinearisedModel:
         Its effects and gravity are kept; its four nominal parameters are those asked for.
     tap : TapInput
     force, position : BlockMeans
-    onset_std_s : float
-        Of the moment of first contact; it is fitted where this is above 0.
+    recorder_std : RecorderStd
+        If one of these is above 0, what they are of is fitted.
 
     Attributes
     ----------
@@ -94,17 +102,22 @@ class LinearisedModel:
     """
 
     def __init__(
-        self, plant: Plant, tap: TapInput, force: BlockMeans, position: BlockMeans, onset_std_s: float = 0.0
+        self,
+        plant: Plant,
+        tap: TapInput,
+        force: BlockMeans,
+        position: BlockMeans,
+        recorder_std: RecorderStd = (0.0, 0.0, 0.0, 0.0),
     ) -> None:
         self.tap = tap
-        self.onset_std_s = onset_std_s
-        self.parameters = PARAMETERS + (onset_std_s > 0.0)
+        self.recorder_std = np.array(recorder_std)
+        self.parameters = parameter_count(recorder_std)
         self.force_time_s, self.position_time_s = force.time_s, position.time_s
         self.size = len(force.values) + len(position.values)
         self._values = np.concatenate([force.values, position.values])
         self._weights = 1.0 / np.concatenate([force.std, position.std])
         self._weight_n = tap.mass_kg * plant.gravity_m_s2
-        copies = self.parameters + 1
+        copies = min(self.parameters + 1, FORCE_SCALE + 1)
         self._ensemble = Ensemble(
             [tap] * copies,
             tuple(plant.effects),
@@ -143,10 +156,20 @@ class LinearisedModel:
                 count += counted
         return math.sqrt(total / count)
 
+    @property
+    def onset_std_s(self) -> float:
+        """Standard deviation of the moment of first contact [s]."""
+        return float(self.recorder_std[0])
+
+    @property
+    def kink_form(self) -> Samples:
+        """How z follows theta, shape (p,)."""
+        form = np.array([1.0, -1.0, 0.0, -1.0, 0.0, self.recorder_std[1], -self.recorder_std[2], 0.0])
+        return form[: self.parameters]
+
     def kink_coordinate(self, theta: Samples) -> float:
         """Give z = ln(mu_s m g / (b v)); positive if static friction bears the first contact force."""
-        log_mu_s_over_b = float(theta[MU_K] - theta[RATIO] - theta[DAMPING])
-        return log_mu_s_over_b + math.log(self._weight_n / self.tap.velocity_m_s)
+        return float(self.kink_form @ theta) + math.log(self._weight_n / self.tap.velocity_m_s)
 
     def linearise(self, theta: Samples, side: int = 0, beyond: float = 0.0) -> Linearisation:
         """Residuals and their normal equations at `theta`.
@@ -167,22 +190,36 @@ class LinearisedModel:
             The motion is not finite with these parameters.
         """
         count = self.parameters
-        rows = np.exp(theta[:PARAMETERS] + STEPS[: count + 1])
+        moved = theta + STEPS[: len(self._table), :count]
+        rows = np.exp(moved[:, :PARAMETERS])
         mu_k, damping = rows[:, MU_K], rows[:, DAMPING]
         mu_s = mu_k / rows[:, RATIO]
+        mass_kg = velocity_m_s = onset_s = None
+        slipping = damping * (self.tap.velocity_m_s / self._weight_n)
+        if count > PARAMETERS:
+            onset_s, log_mass, log_velocity, _ = (moved[:, PARAMETERS:] * self.recorder_std).T
+            mass_kg = self.tap.mass_kg * np.exp(log_mass)
+            velocity_m_s = self.tap.velocity_m_s * np.exp(log_velocity)
+            slipping = slipping * np.exp(log_velocity - log_mass)
         if side < 0:
-            mu_s = np.minimum(mu_s, damping * self.tap.velocity_m_s / self._weight_n * (1.0 - 1e-7))
+            mu_s = np.minimum(mu_s, slipping * (1.0 - 1e-7))
         table = self._table.copy()
         table[:, 0], table[:, 1], table[:, 2], table[:, 3] = rows[:, STIFFNESS], damping, mu_s, mu_k
-        onset_s = None
+        traces = self._ensemble.traces(table, mass_kg=mass_kg, velocity_m_s=velocity_m_s, onset_s=onset_s)
+        steps, force, position = STEPS_OUT[:count], traces.force_n, traces.position_m
         if count > PARAMETERS:
-            onset_s = self.onset_std_s * (theta[ONSET] + ONSET_STEPS)
-        traces = self._ensemble.traces(table, onset_s=onset_s)
-        steps = STEPS_OUT[:count]
-        fields = _linearise(traces.force_n, traces.position_m, self._values, self._weights, steps, beyond)
+            force, position = self._with_force_scale(force, position, theta[FORCE_SCALE])
+        fields = _linearise(force, position, self._values, self._weights, steps, beyond)
         if not math.isfinite(fields[3]):
             raise PhysicsError("the motion is not finite with these parameters")
         return Linearisation(*fields)
+
+    def _with_force_scale(self, force: Samples, position: Samples, in_stds: float) -> tuple[Samples, Samples]:
+        """Scale the force of all copies, and add the copy in which its scale is stepped."""
+        std = self.recorder_std[FORCE_SCALE - PARAMETERS]
+        force = math.exp(std * in_stds) * force
+        stepped = math.exp(std * RECORDER_STEP) * force[: len(self.force_time_s)]
+        return np.append(force, stepped), np.append(position, position[: len(self.position_time_s)])
 
 
 @compiled

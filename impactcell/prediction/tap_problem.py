@@ -9,9 +9,9 @@ from impactcell.numerics.jit import compiled
 from impactcell.prediction import gauss_newton
 from impactcell.prediction.gauss_newton import Step, StopRule
 from impactcell.prediction.linearised_model import (
+    FARTHEST,
     JUST_STICKING,
-    LATEST_ONSET,
-    ONSET,
+    PARAMETERS,
     RATIO,
     Linearisation,
     LinearisedModel,
@@ -19,7 +19,7 @@ from impactcell.prediction.linearised_model import (
 from impactcell.prediction.posterior import TruncatedGaussian
 from impactcell.records import Samples
 
-STOP = StopRule(max_steps=25, length=0.02, cost=0.005, refused_cost=0.1)
+STOP = StopRule(max_steps=50, length=0.02, cost=0.005, refused_cost=0.1)
 """When the fit of one tap ends: an estimate off by 0.02 of its standard deviation is off by nothing."""
 MAX_STEP_STD, MAX_STEP = 4.0, 0.5
 """Longest step, in standard deviations of the prior and in theta: beyond, the linear model says nothing."""
@@ -192,7 +192,8 @@ class TapProblem:
         )
         longest = np.minimum(MAX_STEP, MAX_STEP_STD / np.maximum(prior.weight, 1e-12))
         theta = start.theta + np.minimum(np.maximum(step, -longest), longest)
-        theta[ONSET:] = np.minimum(np.maximum(theta[ONSET:], -LATEST_ONSET), LATEST_ONSET)
+        farthest = FARTHEST[: len(theta) - PARAMETERS]
+        theta[PARAMETERS:] = np.minimum(np.maximum(theta[PARAMETERS:], -farthest), farthest)
         return Step(theta, length, covariance)
 
     def noise(self, at: Minimum) -> float:

@@ -16,11 +16,12 @@ from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
 from impactcell.features import Features, SlideFeatures, required
 from impactcell.features.contact import refuse_clipped
 from impactcell.physics import Plant
-from impactcell.prediction.capture_blocks import linearised_model
+from impactcell.prediction.capture_blocks import linearised_model, recorder_std_of
 from impactcell.prediction.linearised_model import (
     MU_K,
     PARAMETERS,
     LinearisedModel,
+    parameter_count,
     parameters_of,
     with_parameters,
 )
@@ -39,8 +40,6 @@ KINK_DISTANCE_STD = 6.0
 """Standard deviations of z beyond which the other side of the kink has no weight."""
 MU_K_FORM, MU_S_FORM = np.array([1.0, 0.0, 0.0, 0.0]), np.array([1.0, -1.0, 0.0, 0.0])
 """How ln mu_k and ln mu_s follow theta."""
-KINK_FORM = np.array([1.0, -1.0, 0.0, -1.0])
-"""How z, which tells the side of the kink, follows theta."""
 MAX_MISFIT = 4.0
 """Misfit of blocks from which on the waveform is not believed at all."""
 REWEIGHTING_ROUNDS = 3
@@ -55,8 +54,9 @@ class WaveformFit:
     ----------
     mu_s, mu_s_std, mu_k, mu_k_std : float
         Posterior means and standard deviations.
-    theta : ndarray, shape (4,) or (5,)
-        Most probable ln(mu_k, mu_k/mu_s, k, b), and first contact where it is not told.
+    theta : ndarray, shape (4,) or (8,)
+        Most probable ln(mu_k, mu_k/mu_s, k, b), and of a tap that was measured its first contact, mass,
+        velocity and scale of the force, in standard deviations from what is known of them.
     posterior : Posterior
         Of theta.
     immediate : float
@@ -80,7 +80,7 @@ class WaveformFit:
 
 
 def prior_of(model: Model, parameters: int = PARAMETERS) -> GaussianPrior:
-    """Prior of a tap's parameters, with its first contact where that is one; nothing is known of mu_k."""
+    """Prior of a tap's parameters, with those of its record where they are; nothing is known of mu_k."""
     plant, prior = model.plant, model.prior
     weight = np.array(
         [
@@ -115,7 +115,7 @@ def fit(features: Features, model: Model) -> WaveformFit:
     """
     refuse_clipped(required(features.force))
     slide, capture = required(features.slide), features.capture
-    prior = prior_of(model, PARAMETERS + (capture.onset_std_s > 0.0))
+    prior = prior_of(model, parameter_count(recorder_std_of(capture)))
     theta = prior.mean.copy()
     theta[MU_K] = math.log(max(deceleration_friction(model, capture.mass_kg, slide), 1e-3))
     if not (capture.mass_kg > 0.0 and capture.velocity_m_s > 0.0):
@@ -130,14 +130,14 @@ def fit(features: Features, model: Model) -> WaveformFit:
 
 def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples) -> WaveformFit:
     response = linearised_model(features, with_parameters(plant, start))
-    kink_form = _over(KINK_FORM, response.parameters)
+    kink_form = response.kink_form
     offset = response.kink_coordinate(start) - float(kink_form @ start)
     fits = _fit_both_sides(response, prior, start)
-    plain, misfit = _likelier_side(fits, prior, offset)
+    plain, misfit = _likelier_side(fits, prior, (kink_form, offset))
     if misfit > MISFIT_THRESHOLD:  # perhaps only because the start had its kinks elsewhere
         response = linearised_model(features, with_parameters(plant, plain.theta))
         fits = _fit_both_sides(response, prior, plain.theta)
-        plain, misfit = _likelier_side(fits, prior, offset)
+        plain, misfit = _likelier_side(fits, prior, (kink_form, offset))
     widening, best = max(misfit, 1.0), plain
     if misfit > MISFIT_THRESHOLD:
         widening = 1.0
@@ -148,7 +148,7 @@ def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples)
             fits = _fit_both_sides(
                 response.reweighted(std_factors(residual, phase) * LATE_FACTORS[phase]), prior, best.theta
             )
-            best, _ = _likelier_side(fits, prior, offset)
+            best, _ = _likelier_side(fits, prior, (kink_form, offset))
     gap = response.gap(plain.residual)
     if misfit > MAX_MISFIT:
         raise NotConvergedError(f"the model misses this tap: residuals are {gap:.3g} times the noise", gap)
@@ -177,7 +177,7 @@ def _fit_both_sides(response: LinearisedModel, prior: GaussianPrior, start: Samp
     """Descend on the side of the start, and on the other where the kink is near."""
     side = 1 if response.kink_coordinate(start) >= 0.0 else -1
     minimum = TapProblem(response, prior, side).fit(start)
-    form = _over(KINK_FORM, response.parameters)
+    form = response.kink_form
     spread = math.sqrt(float(form @ minimum.truncated(prior).covariance @ form))
     if side * response.kink_coordinate(minimum.theta) >= KINK_DISTANCE_STD * spread:
         return [minimum]
@@ -185,11 +185,13 @@ def _fit_both_sides(response: LinearisedModel, prior: GaussianPrior, start: Samp
 
 
 def _over(form: Samples, parameters: int) -> Samples:
-    """Give a linear form over all of theta: nothing of it follows first contact."""
+    """Give a linear form over all of theta: nothing of it follows what is known of the record."""
     return form if len(form) == parameters else np.pad(form, (0, parameters - len(form)))
 
 
-def _likelier_side(fits: list[Minimum], prior: GaussianPrior, offset: float) -> tuple[Minimum, float]:
+def _likelier_side(
+    fits: list[Minimum], prior: GaussianPrior, kink: tuple[Samples, float]
+) -> tuple[Minimum, float]:
     """Side with the greater probability, and its misfit; the lower minimum may lie beyond its side's end."""
     parameters = len(fits[0].theta)
     freedom = max(len(fits[0].residual) - parameters, 1)
@@ -198,8 +200,7 @@ def _likelier_side(fits: list[Minimum], prior: GaussianPrior, offset: float) -> 
         return fits[0], misfit
     weights = mixture(
         tuple(minimum.truncated(prior, max(misfit, 1.0)) for minimum in fits),
-        _over(KINK_FORM, parameters),
-        offset,
+        *kink,
     ).weights
     best = fits[int(np.argmax(weights))]
     return best, math.sqrt(best.chi2 / freedom)

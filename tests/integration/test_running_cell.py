@@ -72,7 +72,7 @@ async def test_every_cycle_once_and_right(tmp_path: Path, users: str) -> None:
     assert seen == list(range(seen[0], CYCLES + 1))
     assert seen[0] <= 3
     for time, cycle in cycles.items():
-        assert friction[time].Value.Value == pytest.approx(told[cycle]["mu_s"], rel=0.02)
+        assert friction[time].Value.Value == pytest.approx(told[cycle]["mu_s"], rel=0.06)
 
 
 async def test_a_module_that_is_not_there_is_said_and_the_service_ends_cleanly(tmp_path: Path) -> None:

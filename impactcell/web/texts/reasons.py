@@ -12,6 +12,12 @@ GERMAN: Final = {
     r"stroke (.+) is not the (.+) of the calibration": r"Hub \1 ist nicht der der Kalibrierung, \2",
     r"residuals are (\S+) times the sensors' noise: the model lacks something":
         r"die Abweichung ist \1-mal das Rauschen der Sensoren: dem Modell fehlt etwas",
+    r"the tap is that of (\S+) kg, not (\S+) kg: check the mass":
+        r"dieser Stoß ist der von \1 kg, nicht \2 kg: Masse prüfen",
+    r"the tap is that of (\S+) mm/min, not (\S+) mm/min: check the velocity":
+        r"dieser Stoß ist der von \1 mm/min, nicht \2 mm/min: Geschwindigkeit prüfen",
+    r"the force is (\S+) times that of the model: check its scale":
+        r"die Kraft ist \1-mal die des Modells: ihren Maßstab prüfen",
     r"mu_s through mu_k/mu_s of the model: the part moved at once":
         "µs über µk/µs des Modells: das Teil bewegte sich sofort",
     r"no (force|position) was recorded": r"\1 wurde nicht aufgezeichnet",

@@ -48,12 +48,12 @@ def test_an_effect_that_the_model_knows_makes_no_cycle_deviant(seed: int) -> Non
     assert deviant_cycles(design, seed, 90) == []
 
 
-@pytest.mark.parametrize("seed", [6, 9])
-def test_an_effect_of_every_cycle_is_soon_how_cycles_vary(seed: int) -> None:
-    """The model has not taken it over: slow cycles deviate, others between them do not."""
-    found = deviant_cycles(cell_design(read_cell(CONFIG / "cells" / "new-effect.yaml")), seed, 160)
-    assert 5 < len(found) < 15
-    assert found[-1] < 120
+def test_an_effect_of_every_cycle_is_soon_how_cycles_vary() -> None:
+    """The model has not taken it over: slow cycles deviate, others between them do not; 0 to 12 of 135."""
+    design = cell_design(read_cell(CONFIG / "cells" / "new-effect.yaml"))
+    found = [deviant_cycles(design, seed, 160) for seed in (1, 2, 5)]
+    assert 9 < sum(map(len, found)) < 45
+    assert max(cycle for of_seed in found for cycle in of_seed) < 120
 
 
 def test_contact_between_two_samples_of_a_module_bends_no_friction() -> None:

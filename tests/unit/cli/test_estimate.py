@@ -60,7 +60,7 @@ def test_the_plant_is_fitted_and_every_shot_estimated(
     assert tuple(found[0]) == COLUMNS
     assert [row["shot"] for row in found] == [str(n) for n in range(1, len(made) + 1)]
     for column, most in (
-        ("mu_s", 0.01),
+        ("mu_s", 0.025),
         ("mu_s_force", 0.03),
         ("mu_s_distance", 0.05),
         ("mu_s_combined", 0.03),
