@@ -38,9 +38,8 @@ HEADLINES: tuple[tuple[str, Mapping[str, Cell]], ...] = (
     (
         (
             "**Estimate.** Error of one tap's waveform estimate over the Bayesian bound, 2000-6000 mm/min, "
-            "simulated sensors, all else told exactly: {mu_s} for mu_s, {mu_k} for mu_k. As cells take taps, "
-            "with mass, velocity and the force's scale not exact: mu_s to {rms} where the mass is off by 1 %, "
-            "{good} Good, the farthest {far} of its standard deviations off."
+            "simulated sensors: {mu_s} for mu_s, {mu_k} for mu_k. As cells take taps, mass 1 % off: mu_s to "
+            "{rms}, {good} Good, {far} of its standard deviations off at most."
         ),
         {
             **_of(
