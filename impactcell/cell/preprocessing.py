@@ -4,7 +4,17 @@ import math
 from dataclasses import dataclass, replace
 from typing import Final
 
-from impactcell.records import BatchAnnouncement, Capture, Channel, FrictionEstimate, Quality, as_recorded
+from impactcell.records import (
+    FORCE_SCALE_STD,
+    MASS_STD,
+    VELOCITY_STD,
+    BatchAnnouncement,
+    Capture,
+    Channel,
+    FrictionEstimate,
+    Quality,
+    as_recorded,
+)
 
 PERIOD_GAIN = 0.05
 """Share of the latest time between cycles in their mean."""
@@ -22,12 +32,15 @@ class CaptureDefaults:
         Taken where the module reports none.
     force_noise_std_n, position_noise_std_m : float
         Of the sensors.
+    recorder_std : tuple of float
+        Relative standard deviations of mass, velocity and the scale of the force; 0 where they are exact.
     """
 
     mass_kg: float | None = None
     stroke_m: float | None = None
     force_noise_std_n: float = 0.4
     position_noise_std_m: float = 1.5e-6
+    recorder_std: tuple[float, float, float] = (MASS_STD, VELOCITY_STD, FORCE_SCALE_STD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,14 +71,14 @@ class CycleBatch:
 
 
 def fill_defaults(defaults: CaptureDefaults, capture: Capture) -> Capture:
-    """Fill in what the module does not report: mass, stroke, noise; contact, which it sees to a sample."""
+    """Fill in what the module does not report: mass, stroke, noise, and how well it knows them."""
     mass_kg, stroke_m = capture.mass_kg, capture.stroke_m
     if math.isnan(mass_kg) and defaults.mass_kg is not None:
         mass_kg = defaults.mass_kg
     if math.isinf(stroke_m) and defaults.stroke_m is not None:
         stroke_m = defaults.stroke_m
     return replace(
-        as_recorded(capture),
+        as_recorded(capture, *defaults.recorder_std),
         mass_kg=mass_kg,
         stroke_m=stroke_m,
         force=_with_noise(capture.force, defaults.force_noise_std_n),

@@ -105,8 +105,9 @@ def _of_taps(
     if cell is not None:
         from impactcell.settings import read_cell
 
-        plant = read_cell(cell).model
-        taps = [replace(tap, capture=as_recorded(tap.capture)) for tap in taps]
+        known = read_cell(cell)
+        plant, errors = known.model, known.settings.recorder_std
+        taps = [replace(tap, capture=as_recorded(tap.capture, *errors)) for tap in taps]
     else:
         with progress("fitting the plant", 1):
             fitted, taps = fit_plant_and_onset(taps, campaign.gravity_m_s2)

@@ -6,6 +6,9 @@ from it; a `Snapshot` holds them together for one cycle and is what is published
 
 from impactcell.records.alarm import Alarm, Evidence, Shelving
 from impactcell.records.capture import (
+    FORCE_SCALE_STD,
+    MASS_STD,
+    VELOCITY_STD,
     Capture,
     Channel,
     Samples,
@@ -29,6 +32,9 @@ from impactcell.records.module import BatchAnnouncement, CycleId, ModuleStatus
 from impactcell.records.snapshot import PositioningState, Snapshot, TapPredictions
 
 __all__ = [
+    "FORCE_SCALE_STD",
+    "MASS_STD",
+    "VELOCITY_STD",
     "Alarm",
     "BatchAnnouncement",
     "BatchState",

@@ -146,12 +146,20 @@ def with_open_onset(capture: Capture) -> Capture:
     return capture if capture.onset_std_s >= std_s else replace(capture, onset_std_s=std_s)
 
 
-def as_recorded(capture: Capture) -> Capture:
-    """Say what nobody knows exactly of a measured tap: first contact, mass, velocity, scale of the force."""
+def as_recorded(
+    capture: Capture,
+    mass_std: float = MASS_STD,
+    velocity_std: float = VELOCITY_STD,
+    force_scale_std: float = FORCE_SCALE_STD,
+) -> Capture:
+    """Say what nobody knows exactly of a measured tap: first contact, mass, velocity, scale of the force.
+
+    The standard deviations are relative; what the capture says itself is kept where it is more.
+    """
     opened = with_open_onset(capture)
     return replace(
         opened,
-        mass_std=max(opened.mass_std, MASS_STD),
-        velocity_std=max(opened.velocity_std, VELOCITY_STD),
-        force_scale_std=max(opened.force_scale_std, FORCE_SCALE_STD),
+        mass_std=max(opened.mass_std, mass_std),
+        velocity_std=max(opened.velocity_std, velocity_std),
+        force_scale_std=max(opened.force_scale_std, force_scale_std),
     )

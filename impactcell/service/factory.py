@@ -60,6 +60,7 @@ def cell_design(cell: CellConfig) -> CellDesign:
             stroke_m=None if stroke_mm is None else stroke_mm * MM,
             force_noise_std_n=settings.sensors.force_noise_std_n,
             position_noise_std_m=settings.sensors.position_noise_std_um * UM,
+            recorder_std=settings.recorder_std,
         ),
         false_alarm_cycles=settings.alarms.false_alarm_cycles,
     )

@@ -116,11 +116,17 @@ class ModuleSection(Section):
         return self
 
 
+ErrorPercent = Annotated[float, Field(ge=0, le=10)]
+"""What is not exact, in per cent of it."""
+
+
 class PartSection(Section):
     """The part that is struck."""
 
     mass_kg: Positive | None = None
     """Mass where the module does not report one for each cycle."""
+    mass_error_percent: ErrorPercent = _CAPTURE.recorder_std[0] * 100.0
+    """One standard deviation of a mass, reported or this; 0 where it is exact to 0.01 %."""
 
 
 class ActuatorSection(Section):
@@ -130,6 +136,8 @@ class ActuatorSection(Section):
     """Travel from first contact where the module does not report one for each cycle."""
     max_velocity_mm_per_min: Positive = 6000.0
     """Fastest tap that may be commanded."""
+    velocity_error_percent: ErrorPercent = _CAPTURE.recorder_std[1] * 100.0
+    """One standard deviation of a velocity from what was commanded; 0 where it is exact to 0.01 %."""
     max_stroke_mm: Positive = 1.5
     """Longest stroke that may be commanded."""
     max_force_n: Positive | None = None
@@ -139,12 +147,14 @@ class ActuatorSection(Section):
 
 
 class SensorSection(Section):
-    """Noise of the sensors, one standard deviation."""
+    """Noise of the sensors, one standard deviation, and their scale."""
 
     force_noise_std_n: Positive = _CAPTURE.force_noise_std_n
     """Force sensor."""
     position_noise_std_um: Positive = _CAPTURE.position_noise_std_m * 1e6
     """Position sensor."""
+    force_scale_error_percent: ErrorPercent = _CAPTURE.recorder_std[2] * 100.0
+    """One standard deviation of the force sensor's scale; 0 where it is exact to 0.01 %."""
 
 
 class TrackingSection(Section):
@@ -271,6 +281,17 @@ class CellSettings(Section):
     """Absent: no health and metrics over HTTP."""
     web: WebSection | None = WebSection()
     """The live page; null: none."""
+
+    @property
+    def recorder_std(self) -> tuple[float, float, float]:
+        """Relative standard deviations of mass, velocity and the scale of the force."""
+        per_cent = (
+            self.part.mass_error_percent,
+            self.actuator.velocity_error_percent,
+            self.sensors.force_scale_error_percent,
+        )
+        mass, velocity, scale = (one / 100.0 for one in per_cent)
+        return mass, velocity, scale
 
 
 def schema() -> str:

@@ -3,16 +3,21 @@
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from impactcell.cell.preprocessing import fill_defaults
 from impactcell.features import extract
 from impactcell.physics import Plant
 from impactcell.prediction import Model, Prior, estimate
 from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.records import Capture, Quality, as_recorded
+from impactcell.service.factory import cell_design
+from impactcell.settings import read_cell
 from impactcell.web.texts.reasons import german_reason
+from tests.integration.processes import CONFIG
 from tests.taps import VISCOUS, Tap
 
 PLANT = Plant(6.5e5, 465.0, 0.2, 0.152, effects=VISCOUS)
@@ -65,6 +70,26 @@ def test_what_is_told_quite_wrong_is_named(wrong: str, factor: float, said: str)
     assert re.fullmatch(said, mu_s.reason)
     assert german_reason(mu_s.reason) is not None
     assert abs(mu_s.value - tap.mu_s) < 3.0 * mu_s.std
+
+
+def test_a_cell_that_knows_its_mass_drive_and_sensor_better_sees_mu_s_better(tmp_path: Path) -> None:
+    """Values of the YAML; that of sensors stands between the others."""
+    text = (CONFIG / "cells" / "prototype.yaml").read_text(encoding="utf-8").replace("../", f"{CONFIG}/")
+    for key, value in (
+        ("mass_kg: 18.9", "mass_error_percent: 0.01"),
+        ("stroke_mm: 1.5", "velocity_error_percent: 0"),
+        ("force_noise_std_n: 0.4", "force_scale_error_percent: 0.01"),
+    ):
+        text = text.replace(f"  {key}\n", f"  {key}\n  {value}\n")
+    (tmp_path / "exact.yaml").write_text(text, encoding="utf-8")
+    tap, stds = Tap(3000 / 6e4, stroke_m=1.5e-3), []
+    for file in (CONFIG / "cells" / "prototype.yaml", tmp_path / "exact.yaml"):
+        defaults = cell_design(read_cell(file)).defaults
+        seen = fill_defaults(defaults, tap.capture(np.random.default_rng(6), 1e6))
+        mu_s = estimate(seen, MODEL).mu_s
+        assert abs(mu_s.value - tap.mu_s) < 3.0 * mu_s.std
+        stds.append(mu_s.std)
+    assert stds[1] < 0.6 * stds[0]
 
 
 def test_a_campaign_of_masses_told_a_little_wrong_has_the_right_plant() -> None:
