@@ -7,7 +7,7 @@ part which sticks for longer, and of a light part mu_s comes out twice as large,
 from collections.abc import Sequence
 from dataclasses import replace
 
-from impactcell.errors import NotConvergedError
+from impactcell.errors import NotConvergedError, PredictionError
 from impactcell.features import Features
 from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.prediction.plant_fit import PlantFit
@@ -26,7 +26,7 @@ def fit_plant_and_onset(
 ) -> tuple[PlantFit, Sequence[Features]]:
     """Fit the plant with each tap's moment of contact: within a step, or farther if that explains the taps.
 
-    Mass, velocity and scale of the force are known so well only, and no better where that explains the taps.
+    Mass, velocity and scale of the force are each tap's own as well, as far as that explains the taps.
 
     Returns
     -------
@@ -61,11 +61,11 @@ def fit_plant_and_onset(
 
 def _fitted(
     taps: Sequence[Features], gravity_m_s2: float, name: str
-) -> tuple[PlantFit | None, NotConvergedError | None]:
+) -> tuple[PlantFit | None, PredictionError | None]:
     """Fit the plant, or give the fault for which it cannot be."""
     try:
         return fit_plant(taps, gravity_m_s2, name), None
-    except NotConvergedError as fault:
+    except PredictionError as fault:
         return None, fault
 
 
