@@ -99,6 +99,8 @@ class LinearisedModel:
     ----------
     parameters : int
         Length p of theta.
+    kink_form : ndarray, shape (p,)
+        How z follows theta.
     """
 
     def __init__(
@@ -112,6 +114,9 @@ class LinearisedModel:
         self.tap = tap
         self.recorder_std = np.array(recorder_std)
         self.parameters = parameter_count(recorder_std)
+        _, mass_std, velocity_std, _ = recorder_std
+        kink_form = np.array([1.0, -1.0, 0.0, -1.0, 0.0, mass_std, -velocity_std, 0.0])
+        self.kink_form = kink_form[: self.parameters]
         self.force_time_s, self.position_time_s = force.time_s, position.time_s
         self.size = len(force.values) + len(position.values)
         self._values = np.concatenate([force.values, position.values])
@@ -160,12 +165,6 @@ class LinearisedModel:
     def onset_std_s(self) -> float:
         """Standard deviation of the moment of first contact [s]."""
         return float(self.recorder_std[0])
-
-    @property
-    def kink_form(self) -> Samples:
-        """How z follows theta, shape (p,)."""
-        form = np.array([1.0, -1.0, 0.0, -1.0, 0.0, self.recorder_std[1], -self.recorder_std[2], 0.0])
-        return form[: self.parameters]
 
     def kink_coordinate(self, theta: Samples) -> float:
         """Give z = ln(mu_s m g / (b v)); positive if static friction bears the first contact force."""
