@@ -36,6 +36,8 @@ class PlannedShot:
     ratio_factor: float
     strength: float
     columns: Mapping[str, float]
+    velocity_over_told: float = 1.0
+    mass_over_told: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,11 +52,13 @@ class MadeShot:
 
 def make(scenario: CampaignScenario) -> tuple[Plant, tuple[MadeShot, ...]]:
     """Strike every shot of a scenario; the base plant, before scatter, and the shots in order."""
-    design, noise, columns = (
-        np.random.default_rng(seed) for seed in np.random.SeedSequence(scenario.seed).spawn(3)
+    design, noise, columns, told = (
+        np.random.default_rng(seed) for seed in np.random.SeedSequence(scenario.seed).spawn(4)
     )
     base = _base_plant(scenario, design)
-    plans = tuple(_with_columns(scenario, plan, columns) for plan in _plan(scenario, design))
+    plans = tuple(
+        _off_told(scenario, _with_columns(scenario, plan, columns), told) for plan in _plan(scenario, design)
+    )
     return base, tuple(_shot(scenario, base, plan, len(plans), noise) for plan in plans)
 
 
@@ -117,6 +121,17 @@ def _with_columns(scenario: CampaignScenario, plan: PlannedShot, random: np.rand
     return replace(plan, factor=factor, strength=strength, columns=values)
 
 
+def _off_told(scenario: CampaignScenario, plan: PlannedShot, random: np.random.Generator) -> PlannedShot:
+    """Draw how far velocity and mass of a shot are from what is told of them."""
+    told = scenario.told
+    velocity, mass = random.standard_normal(2)
+    return replace(
+        plan,
+        velocity_over_told=float(1.0 + told.velocity_error + told.velocity_scatter * velocity),
+        mass_over_told=float(1.0 + told.mass_error + told.mass_scatter * mass),
+    )
+
+
 def _factor(table: Sequence[tuple[float, float]], value: float) -> float:
     """Give the factor at a column's value; 1 where there is no table."""
     if not table:
@@ -147,8 +162,8 @@ def _shot(
     match scenario.excitation:
         case "tap":
             strike = TapInput(
-                velocity_m_s=plan.velocity * MM_PER_MIN,
-                mass_kg=plan.mass_kg,
+                velocity_m_s=plan.velocity * plan.velocity_over_told * MM_PER_MIN,
+                mass_kg=plan.mass_kg * plan.mass_over_told,
                 stroke_m=scenario.stroke_m,
                 direction=plan.direction,
                 start_m=plan.start_m,

@@ -95,6 +95,18 @@ class ColumnScenario(ScenarioModel):
         return self
 
 
+class ToldScenario(ScenarioModel):
+    """How far the settings of a tap are from what `shots.csv` tells of them.
+
+    Velocity and mass are those told times 1 + error + scatter z, with z standard normal, anew for each shot.
+    """
+
+    velocity_error: Annotated[float, Field(gt=-1.0, lt=1.0)] = 0.0
+    velocity_scatter: Share = 0.0
+    mass_error: Annotated[float, Field(gt=-1.0, lt=1.0)] = 0.0
+    mass_scatter: Share = 0.0
+
+
 class CampaignScenario(ScenarioModel):
     """A whole campaign; see config/sim/campaign.yaml for every key with its meaning."""
 
@@ -108,6 +120,7 @@ class CampaignScenario(ScenarioModel):
     velocity_jitter: Share = 0.0
     masses_kg: list[Positive] = Field([12.6, 18.9, 25.2])
     mass_stated: bool = True
+    told: ToldScenario = ToldScenario()
     directions: list[Literal[1, -1]] = Field([1, -1])
     starts_m: list[float] = Field([0.0])
     replicates: Annotated[int, Field(ge=1)] = 2

@@ -1,5 +1,6 @@
-"""Where the workflow starts: the nominal model on the training shots, and when contact began in them."""
+"""Where the workflow starts: the nominal model on the training shots, as told or open in what may be off."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from impactcell.discrepancy.data import (
@@ -16,12 +17,16 @@ from impactcell.discrepancy.model import (
     Problem,
     contact_note,
     contact_scatter,
+    fit_from,
     fit_nominal,
-    free_contact,
+    setting_notes,
     usable_blocks,
+    with_open_settings,
 )
 from impactcell.physics import Plant
 
+ONSET = "onset_s"
+"""First contact, by its name among the shots' own numbers."""
 COARSE_SAMPLES = 400
 """Samples of a channel and shot that a search among many models reads."""
 
@@ -36,6 +41,8 @@ class NominalModel:
         Places of the shots.
     problem : Problem
     fit : Fit
+    opened : tuple of str
+        What shots have of their own that records had told.
     """
 
     prepared: PreparedCampaign
@@ -43,6 +50,7 @@ class NominalModel:
     training: IndexArray
     problem: Problem
     fit: Fit
+    opened: tuple[str, ...] = ()
 
     @property
     def coarse(self) -> Problem:
@@ -58,26 +66,56 @@ class NominalModel:
     def with_open_contact(self) -> "NominalModel":
         """Let first contact of every shot lie within a sampling step of t = 0."""
         prepared = with_open_onset(self.prepared)
+        return self._reopened(prepared, (*self.opened, ONSET))
+
+    def with_settings(self, names: Sequence[str]) -> "NominalModel":
+        """Let velocity, mass or both of every shot be a little off what is told."""
+        prepared = replace(self.prepared, shots=with_open_settings(self.prepared.shots, names))
+        return self._reopened(prepared, tuple(names))
+
+    def _reopened(self, prepared: PreparedCampaign, opened: tuple[str, ...]) -> "NominalModel":
         problem = problem_of(prepared, self.floor, self.training)
-        fitted = free_contact(problem, self.fit)
-        prepared = replace(prepared, notes=(*prepared.notes, contact_note(fitted)))
-        return NominalModel(prepared, self.floor, self.training, problem, fitted)
+        return NominalModel(prepared, self.floor, self.training, problem, fit_from(problem, self.fit), opened)
+
+    def notes(self, final: Fit) -> tuple[str, ...]:
+        """Say what the shots have of their own that records had told, by the model left in the end."""
+        contact = (contact_note(final),) if ONSET in self.opened else ()
+        return (*contact, *setting_notes(final, [name for name in self.opened if name != ONSET]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OtherContact:
-    """The nominal model with first contact open, where the one in use has it at t = 0."""
+class NominalModels:
+    """The nominal model, and the one that it may give way to.
 
-    nominal: NominalModel
-    scatter: ContactScatter
+    Attributes
+    ----------
+    exact : NominalModel
+        First contact at t = 0, unless the records have samples before it.
+    contact_free : NominalModel or None
+        First contact open, where it is not in the other one and there is any.
+    scatter : ContactScatter or None
+        Of first contact, as it is in `contact_free`.
+    """
+
+    exact: NominalModel
+    contact_free: NominalModel | None = None
+    scatter: ContactScatter | None = None
+
+    @property
+    def start(self) -> NominalModel:
+        """The one to start from: where contact differs among like shots it is open."""
+        seen = self.scatter is not None and self.scatter.is_seen
+        return self.contact_free if seen and self.contact_free is not None else self.exact
+
+    def with_settings(self, names: Sequence[str]) -> "NominalModels":
+        """Let velocity, mass or both of every shot be a little off what is told."""
+        return _with_contact(self.exact.with_settings(names))
 
 
 def nominal_models(
     prepared: PreparedCampaign, floor: NoiseFloor, training: IndexArray, plant: Plant | None
-) -> tuple[NominalModel, OtherContact | None]:
+) -> NominalModels:
     """Fit the nominal model, and the one that it may give way to: with first contact open.
-
-    Where contact differs among like shots it is open from the start.
 
     Raises
     ------
@@ -93,11 +131,15 @@ def nominal_models(
             training = training[kept]
             problem = problem_of(prepared, floor, training)
             nominal = NominalModel(prepared, floor, training, problem, fit_nominal(problem, plant))
-    if nominal.is_open or not prepared.excitation.has_contact:
-        return nominal, None
+    return _with_contact(nominal)
+
+
+def _with_contact(nominal: NominalModel) -> NominalModels:
+    """See how first contact scatters."""
+    if nominal.is_open or not nominal.prepared.excitation.has_contact:
+        return NominalModels(nominal)
     contact_free = nominal.with_open_contact()
-    scatter = contact_scatter(contact_free.problem, contact_free.fit)
-    return (contact_free, None) if scatter.is_seen else (nominal, OtherContact(contact_free, scatter))
+    return NominalModels(nominal, contact_free, contact_scatter(contact_free.problem, contact_free.fit))
 
 
 def problem_of(prepared: PreparedCampaign, floor: NoiseFloor, indices: IndexArray) -> Problem:

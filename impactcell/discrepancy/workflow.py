@@ -23,7 +23,8 @@ from impactcell.discrepancy.model import (
     linearise,
     refit_shot_parameters,
 )
-from impactcell.discrepancy.nominal_model import NominalModel, OtherContact, nominal_models, problem_of
+from impactcell.discrepancy.nominal_model import nominal_models, problem_of
+from impactcell.discrepancy.open_records import find_basis
 from impactcell.discrepancy.search import (
     MAX_P_VALUE,
     UNKNOWN,
@@ -148,7 +149,8 @@ def investigate(
     floor = sensor_noise(prepared)
     training, held_out = split_held_out(prepared, seed)
     report_step("fitting the nominal model")
-    start, other = nominal_models(prepared, floor, training, plant)
+    nominals = nominal_models(prepared, floor, training, plant)
+    start = nominals.start
     training = start.training
     missing = missing_shots(len(training), len(held_out))
     context = SearchContext(
@@ -162,10 +164,9 @@ def investigate(
         floor_is_certain="stated" in floor.source or prepared.excitation.floor_is_certain,
     )
     report_step("locating the gap and naming effects")
-    selection = only_test(context, start.fit) if missing else select_model(context, start.fit)
-    if other and (selection.accepted is None or selection.remains):
-        start, context, selection = _with_other_contact(context, start, selection, other)
-    prepared, problem, nominal = start.prepared, start.problem, start.fit
+    basis = find_basis(context, nominals, only_test if missing else select_model)
+    context, selection = basis.context, basis.selection
+    prepared, problem, nominal = basis.nominal.prepared, basis.nominal.problem, basis.nominal.fit
     if not missing:
         report_step("holding names against free forms")
         selection = hold_against_free_forms(context, selection)
@@ -194,7 +195,7 @@ def investigate(
     parameters = estimate_parameters(final, linearise(problem, final), shared_error(evidence))
     return DiscrepancyResult(
         conclusion=conclusion,
-        prepared=prepared,
+        prepared=replace(prepared, notes=(*prepared.notes, *basis.notes_of(final))),
         floor=floor,
         replicates=outcome.replicates,
         training=training,
@@ -215,20 +216,6 @@ def investigate(
         law=law,
         seed=seed,
     )
-
-
-def _with_other_contact(
-    context: SearchContext, start: NominalModel, selection: SelectionResult, other: OtherContact
-) -> tuple[NominalModel, SearchContext, SelectionResult]:
-    """Exchange what leaves something for the model with first contact open, if that explains the shots.
-
-    Effects beside it are looked for only where too few replicates say that contact is at t = 0.
-    """
-    nominal = other.nominal
-    beside = replace(context, problem=nominal.problem, coarse=nominal.coarse, prepared=nominal.prepared)
-    found = (select_model if other.scatter.is_open else only_test)(beside, nominal.fit)
-    explains = found.accepted is not None and not found.remains
-    return (nominal, beside, found) if explains else (start, context, selection)
 
 
 def _confirmed_rival(

@@ -98,6 +98,11 @@ class Ensemble:
         if not given_speed:
             self._columns["initial_speed_m_s"] = np.zeros(self._count)
 
+    @property
+    def velocity_m_s(self) -> Samples:
+        """Velocity of every tap, shape (n,)."""
+        return self._columns["velocity_m_s"]
+
     def with_effects(self, effects: Sequence[str]) -> "Ensemble":
         """Return the same taps and samples with other effects at work."""
         other = copy.copy(self)
@@ -174,6 +179,7 @@ class Ensemble:
         friction_factor: Samples | float = 1.0,
         *,
         mass_kg: Samples | None = None,
+        velocity_m_s: Samples | None = None,
         initial_speed_m_s: Samples | None = None,
         onset_s: Samples | None = None,
         only: NDArray[np.bool_] | None = None,
@@ -184,7 +190,7 @@ class Ensemble:
         sample may lie before it. `only`, shape (n,): taps to integrate, where nothing drives them; samples of
         the others are 0.
         """
-        parameters = self._tap_parameters(values, friction_factor, mass_kg, initial_speed_m_s)
+        parameters = self._tap_parameters(values, friction_factor, mass_kg, initial_speed_m_s, velocity_m_s)
         return self._sample(parameters, onset_s, only)
 
     def _sample(

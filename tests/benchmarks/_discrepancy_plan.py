@@ -17,7 +17,7 @@ from simulator.campaign import make
 from simulator.effects import LIBRARY as LAWS
 from simulator.effects import UNLISTED
 from tests.discrepancy import study
-from tests.discrepancy.study import LOGGED, Job, recorded, scenario
+from tests.discrepancy.study import Job, recorded, scenario
 
 CONFOUNDED = frozenset({"mass_error", "force_sensor_gain"})
 EQUIVALENT = (
@@ -71,14 +71,15 @@ def jobs(
     return [job for _, _, job in sorted(placed, key=lambda one: one[:2])]
 
 
-def logged_jobs(later: int = 0) -> list[Job]:
-    """Campaigns whose contact lies anywhere between two samples: every effect twice, what lies outside of the
+def measured_jobs(measured: str, later: int = 0) -> list[Job]:
+    """Campaigns as they are measured, whose contact lies anywhere between two samples (`LOGGED`) or whose
+    velocities and masses are a little off what is told (`TOLD`): every effect twice, what lies outside of the
     vocabulary twice, and 40 with nothing hidden.
     """
     made = [
-        *(replace(job, kind=LOGGED) for job in _single("single", 2, VISIBLE, 80_000)),
-        *(replace(job, kind=f"{LOGGED} outside", seed=job.seed + 50_000) for job in _outside(2)),
-        *(replace(job, kind=f"{LOGGED} none", seed=job.seed + 50_000) for job in _none(40)),
+        *(replace(job, kind=measured) for job in _single("single", 2, VISIBLE, 80_000)),
+        *(replace(job, kind=f"{measured} outside", seed=job.seed + 50_000) for job in _outside(2)),
+        *(replace(job, kind=f"{measured} none", seed=job.seed + 50_000) for job in _none(40)),
     ]
     return [replace(job, seed=job.seed + later) for job in made]
 
@@ -208,7 +209,7 @@ def nominal_gap(job: Job, strength: float, shots: int = FIRST_SHOTS) -> float:
     drawn in the place of the replicates', which on a few shots would be too uncertain to calibrate with.
     """
     rate, study.RATE_HZ = study.RATE_HZ, 2000.0
-    few = replace(job, shots=shots)
+    few = replace(job, shots=shots, kind="single")  # settings exactly as told
     try:
         plan = scenario(few, [strength])
         made = make(plan)[1]

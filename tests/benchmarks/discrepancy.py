@@ -18,16 +18,21 @@ import numpy as np
 from tests.benchmarks import _discrepancy_judge as judge
 from tests.benchmarks import _discrepancy_rivals as rivals
 from tests.benchmarks._discrepancy_judge import judged
-from tests.benchmarks._discrepancy_plan import CONFOUNDED, jobs, logged_jobs
+from tests.benchmarks._discrepancy_plan import CONFOUNDED, jobs, measured_jobs
 from tests.benchmarks._discrepancy_run import ROWS, rows, study
 from tests.benchmarks.table import Table
-from tests.discrepancy.study import LOGGED
+from tests.discrepancy.study import LOGGED, TOLD
 
 Row = dict[str, Any]
 README = Path("impactcell/discrepancy/README.md")
 MARKER = "<!-- tables of the study -->\n"
 NAMED = {judge.RIGHT, judge.TIED}
 FALSELY = {judge.WRONG, judge.PARTIAL, judge.FALSE}
+MEASURED = {
+    LOGGED: "contact anywhere between two samples",
+    TOLD: "velocities and masses a little off what is told",
+}
+"""What is measured and not exact, by how the kinds of its jobs begin."""
 NAMES = {
     judge.RIGHT: "named",
     judge.TIED: "tied with it",
@@ -50,8 +55,9 @@ def kept(found: list[Row], kind: str) -> list[Row]:
 def tables(file: Path = ROWS) -> list[Table]:
     """Bars, hidden effect against answer, and the rivals, from the rows there are."""
     found = rows(file)
-    if logged := [row for row in found if row["job"]["kind"].startswith(LOGGED)]:
-        return [bars_of_logged(logged)]
+    for measured in MEASURED:
+        if its := [row for row in found if row["job"]["kind"].startswith(measured)]:
+            return [bars_of_measured(measured, its)]
     rival = rivals.table(found, rows(rivals.beside(file)))
     return [bars(found), *([rival] if rival else []), confusion(found), reach(found)]
 
@@ -106,14 +112,14 @@ def bars(found: list[Row]) -> Table:
     return Table("Discrepancy: bars", ("what", "bar", "measured", "95 % interval"), made, note)
 
 
-def bars_of_logged(found: list[Row]) -> Table:
-    """What becomes of an answer where a logger shows contact by its samples only."""
+def bars_of_measured(measured: str, found: list[Row]) -> Table:
+    """What becomes of an answer where a record does not tell all of a shot exactly."""
     made: list[list[str]] = []
 
     def bar(what: str, limit: str, of: list[Row], holds: Callable[[Row], bool]) -> None:
         made.append([what, limit, *judge.share(sum(map(holds, of)), len(of))])
 
-    one, none, outside = (kept(found, f"{LOGGED}{kind}") for kind in ("", " none", " outside"))
+    one, none, outside = (kept(found, f"{measured}{kind}") for kind in ("", " none", " outside"))
     bar("one hidden, visible: named, or tied with it", ">= 95 %", one, lambda row: judged(row) in NAMED)
     bar("one hidden: anything else named", "<= 5 %", one, lambda row: judged(row) in FALSELY)
     bar("nothing hidden: something named", "<= 5 %", none, lambda row: bool(row.get("named")))
@@ -121,7 +127,7 @@ def bars_of_logged(found: list[Row]) -> Table:
     bar("outside the vocabulary: unknown", ">= 90 %", outside, lambda row: row["verdict"] == judge.UNKNOWN)
     bar("outside: nothing falsely listed", ">= 80 %", outside, lambda row: not row.get("named"))
     return Table(
-        "Discrepancy: contact anywhere between two samples",
+        f"Discrepancy: {MEASURED[measured]}",
         ("what", "bar", "measured", "95 % interval"),
         made,
         f"{len(found)} campaigns.",
@@ -202,16 +208,18 @@ def main() -> None:
     parser.add_argument("--limit", type=int, help="only the first so many jobs of the plan")
     parser.add_argument("--later", type=int, default=0, help="add this to every seed: campaigns never seen")
     parser.add_argument("--three", type=int, default=0, help="so many campaigns of three effects as well")
-    parser.add_argument(
-        "--logged", action="store_true", help="only campaigns whose contact lies between two samples"
-    )
+    for measured, what in MEASURED.items():
+        parser.add_argument(f"--{measured}", action="store_true", help=f"only campaigns with {what}")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--rivals", action="store_true", help="run the rivals on every third campaign")
     parser.add_argument("--table", action="store_true", help="only print the tables of the rows there are")
     parser.add_argument("--readme", action="store_true", help="write these tables into the README, too")
     given = parser.parse_args()
     wanted = set(filter(None, given.kinds.split(",")))
-    every = logged_jobs(given.later) if given.logged else jobs(later=given.later, three=given.three)
+    every = jobs(later=given.later, three=given.three)
+    for measured in MEASURED:
+        if getattr(given, measured):
+            every = measured_jobs(measured, given.later)
     plan = [job for job in every if not wanted or job.kind in wanted][: given.limit]
     if given.rivals:
         study(rivals.beside(given.rows), rivals.subset(plan, rows(given.rows)), given.workers, rivals.run)

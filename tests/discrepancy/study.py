@@ -28,6 +28,8 @@ FINER = 8
 """How many times as often the plant is sampled as a logger samples it, which sees contact by its samples."""
 LOGGED = "logged"
 """How kinds of jobs begin whose campaigns a logger has recorded."""
+TOLD = "told"
+"""How kinds of jobs begin whose velocities and masses are a little off what is told of them."""
 SIGNED = frozenset(
     {
         "batch_shift", "direction_asymmetry", "force_sensor_gain", "force_sensor_offset", "friction_drift",
@@ -128,6 +130,7 @@ def scenario(job: Job, multiples: Sequence[float] = ()) -> CampaignScenario:
     return CampaignScenario.model_validate(
         {
             "format": 1,
+            "told": off_told(job) if job.kind.startswith(TOLD) else {},
             "seed": job.seed,
             "plant": plant,
             "velocity_jitter": 0.0 if job.replicates else 0.1,
@@ -141,6 +144,19 @@ def scenario(job: Job, multiples: Sequence[float] = ()) -> CampaignScenario:
             "strengths": hidden(job, multiples),
         }
     )
+
+
+def off_told(job: Job) -> dict[str, float]:
+    """How far the settings of a job's shots are from what is told: velocities in common, too, by 0.2 %.
+
+    A mass that is off in common is an effect of the library.
+    """
+    rng = np.random.default_rng([job.seed, 78])
+    return {
+        "velocity_error": float(0.002 * rng.standard_normal()),
+        "velocity_scatter": float(np.exp(rng.uniform(*np.log([3e-4, 3e-3])))),
+        "mass_scatter": float(np.exp(rng.uniform(*np.log([3e-4, 5e-3])))),
+    }
 
 
 def campaign(job: Job, multiples: Sequence[float] = ()) -> Campaign:

@@ -33,7 +33,7 @@ def coordinate(effect: str, name: str) -> Any:
 
 
 def fit_of(coordinates: list[Any], theta: Samples) -> Fit:
-    nothing = ShotParameters(*np.zeros((5, 1)))
+    nothing = ShotParameters(*np.zeros((7, 1)))
     return Fit((), tuple(coordinates), theta, nothing, 1.0, np.zeros(1))
 
 

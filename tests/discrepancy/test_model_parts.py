@@ -10,7 +10,7 @@ from impactcell.discrepancy.data.phases import PHASES
 from impactcell.discrepancy.model import initial_guess
 from impactcell.discrepancy.model.parameters import NOMINAL_COORDINATES
 from impactcell.discrepancy.model.phase_of_samples import phase_positions
-from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.model.shot_freedom import ShotFreedom
 from impactcell.discrepancy.model.shot_parameters import ShotParameters
 from impactcell.physics import Plant
 
@@ -43,9 +43,10 @@ def test_a_plant_that_is_given_is_where_the_fit_starts() -> None:
 
 def test_a_shot_at_rest_stays_at_rest_whatever_the_step() -> None:
     names = ("log_factor", "speed_m_s", "shift_m")
-    problem: Any = SimpleNamespace(shot_parameter_names=names)
-    at = ShotParameters(np.zeros(3), np.ones(3), np.array([0.0, 0.2, -0.1]), np.zeros(3), np.zeros(3))
-    moved = Problem.step_shot_parameters(problem, at, np.full((3, 3), 0.01))
+    freedom = ShotFreedom(names, np.zeros(3, dtype=np.bool_), np.zeros(3), {})
+    nothing = np.zeros((4, 3))
+    at = ShotParameters(np.zeros(3), np.ones(3), np.array([0.0, 0.2, -0.1]), *nothing)
+    moved = freedom.step(at, np.full((3, 3), 0.01))
     assert moved.speed_m_s == pytest.approx([0.0, 0.21, -0.09])
     assert moved.log_factor == pytest.approx([0.01] * 3)
     assert moved.shift_m == pytest.approx([0.01] * 3)

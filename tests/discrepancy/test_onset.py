@@ -117,12 +117,14 @@ def test_an_effect_does_not_look_like_contact_between_samples(effect: str, repli
     job = Job("single", (effect,), 5_060_002, strength=2.0, shots=30, replicates=replicates)
     prepared = prepare(campaign(job))
     training, _ = split_held_out(prepared, job.seed)
-    nominal, other = nominal_models(prepared, sensor_noise(prepared), training, None)
-    assert other is not None
-    assert not nominal.is_open
-    assert other.nominal.is_open
-    assert other.scatter.is_open
-    assert math.isnan(other.scatter.std_s) != replicates
+    nominals = nominal_models(prepared, sensor_noise(prepared), training, None)
+    assert nominals.start is nominals.exact
+    assert not nominals.exact.is_open
+    assert nominals.contact_free is not None
+    assert nominals.contact_free.is_open
+    assert nominals.scatter is not None
+    assert nominals.scatter.is_open
+    assert math.isnan(nominals.scatter.std_s) != replicates
 
 
 def test_an_onset_stays_within_its_step() -> None:
@@ -131,7 +133,7 @@ def test_an_onset_stays_within_its_step() -> None:
     problem = Problem(everything, len(prepared.batches))
     steps = np.zeros((problem.count, len(problem.shot_parameter_names)))
     steps[:, problem.shot_parameter_names.index("onset_s")] = 1.0
-    moved = problem.step_shot_parameters(problem.initial_guess(), steps)
+    moved = problem.freedom.step(problem.initial_guess(), steps)
     np.testing.assert_array_equal(moved.onset_s, problem.onset_step_s)
     assert problem.onset_step_s == pytest.approx(STEP_S)
 

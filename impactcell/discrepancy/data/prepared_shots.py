@@ -51,6 +51,8 @@ class PreparedShot:
         Of the force, of another channel where there is none.
     onset_is_open : bool
         Whether first contact may lie anywhere within a sampling step of t = 0.
+    velocity_is_open, mass_is_open : bool
+        Whether velocity and mass are told as measured ones, which are a little off.
     """
 
     number: int
@@ -70,6 +72,8 @@ class PreparedShot:
     whitener: Samples = field(default_factory=lambda: np.empty((0, 0)))
     sampling_step_s: float = 0.0
     onset_is_open: bool = False
+    velocity_is_open: bool = False
+    mass_is_open: bool = False
 
     @property
     def onset_step_s(self) -> float:

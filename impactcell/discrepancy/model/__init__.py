@@ -6,13 +6,13 @@ from impactcell.discrepancy.model.contact_moment import (
     ContactScatter,
     contact_note,
     contact_scatter,
-    free_contact,
 )
 from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.intervals import ParameterEstimate, SharedError, estimate_parameters
 from impactcell.discrepancy.model.least_squares import (
     Fit,
     fit,
+    fit_from,
     promised_fall,
     refit_shot_parameters,
     simulate_open_loop,
@@ -36,8 +36,17 @@ from impactcell.discrepancy.model.phase_of_samples import phase_positions, sampl
 from impactcell.discrepancy.model.problem import FitState, Problem, remove_jumps
 from impactcell.discrepancy.model.shot_fits import normal_equations
 from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
+from impactcell.discrepancy.model.told_settings import (
+    SETTINGS,
+    implausible_notes,
+    is_plausible,
+    setting_notes,
+    setting_scatter,
+    with_open_settings,
+)
 
 __all__ = [
+    "SETTINGS",
     "Constraints",
     "ContactScatter",
     "Coordinate",
@@ -60,9 +69,11 @@ __all__ = [
     "effect_coordinates",
     "estimate_parameters",
     "fit",
+    "fit_from",
     "fit_nominal",
     "fit_split",
-    "free_contact",
+    "implausible_notes",
+    "is_plausible",
     "linearise",
     "normal_equations",
     "parameter_name",
@@ -72,8 +83,11 @@ __all__ = [
     "remove_jumps",
     "sample_phases",
     "scores",
+    "setting_notes",
+    "setting_scatter",
     "simulate_open_loop",
     "trajectory_of",
     "unmet_gradient",
     "usable_blocks",
+    "with_open_settings",
 ]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.model.least_squares import Fit, fit
+from impactcell.discrepancy.model.least_squares import Fit
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.discrepancy.model.shot_fits import shot_equations
 
@@ -48,18 +48,6 @@ class ContactScatter:
     def is_open(self) -> bool:
         """Whether it may lie there, for too few replicates say that it does not."""
         return self.is_seen or self.degrees_of_freedom < FEWEST_TO_TELL
-
-
-def free_contact(problem: Problem, nominal: Fit) -> Fit:
-    """Fit a model whose first contact may lie within a sampling step of t = 0, from where it lay at 0.
-
-    Raises
-    ------
-    DiscrepancyError
-        The plant has no answer at the start.
-    """
-    model = problem.with_effects(nominal.effects)
-    return fit(model, nominal.theta, nominal.shot_parameters, spread=nominal.spread)
 
 
 def contact_scatter(problem: Problem, fitted: Fit) -> ContactScatter:

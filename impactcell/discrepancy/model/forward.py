@@ -115,7 +115,8 @@ def _sample(
     return ensemble.samples(
         parameters,
         np.exp(shot_parameters.log_factor),
-        mass_kg=shot_parameters.mass_kg,
+        mass_kg=shot_parameters.mass_kg * np.exp(shot_parameters.log_mass),
+        velocity_m_s=ensemble.velocity_m_s * np.exp(shot_parameters.log_velocity),
         initial_speed_m_s=shot_parameters.speed_m_s,
         onset_s=shot_parameters.onset_s if shot_parameters.onset_s.any() else None,
         only=only,

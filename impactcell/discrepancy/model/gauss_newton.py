@@ -68,7 +68,7 @@ def gauss_newton(problem: Problem, state: FitState, most_steps: int, tolerance: 
         trial: FitState | None = None
         for _attempt in range(1 if keep_jacobian else STEPS.attempts):
             theta = _damped_step(state.theta, H, g, damping, bounds)
-            moved = problem.step_shot_parameters(state.shot_parameters, equations.steps(theta - state.theta))
+            moved = problem.freedom.step(state.shot_parameters, equations.steps(theta - state.theta))
             attempt = problem.evaluate(theta, moved, state.spread)
             attempt = correct_shot_parameters(problem, attempt, Jl, equations)
             if attempt.cost + problem.penalty(theta) < state.cost + penalty:

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from impactcell.discrepancy.model.contact_moment import free_contact
-from impactcell.discrepancy.model.least_squares import Fit, fit, initial_shot_parameters
+from impactcell.discrepancy.model.least_squares import Fit, fit, fit_from, initial_shot_parameters
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.errors import DiscrepancyError
 from impactcell.physics import Plant
@@ -24,7 +23,7 @@ def fit_nominal(problem: Problem, plant: Plant | None = None) -> Fit:
         No start leads to a fit.
     """
     if problem.onset_step_s.any():
-        return free_contact(problem, fit_nominal(problem.with_exact_contact(), plant))
+        return fit_from(problem, fit_nominal(problem.with_exact_contact(), plant))
     shots = problem.shots
     guesses = shots.excitation.plant_guesses(shots.items, shots.gravity_m_s2)
     nominal = problem.with_effects(())

@@ -167,6 +167,18 @@ def fit(
     )
 
 
+def fit_from(problem: Problem, model: Fit) -> Fit:
+    """Fit a model to shots of which something is open that was not, from where it stands.
+
+    Raises
+    ------
+    DiscrepancyError
+        The plant has no answer there.
+    """
+    model_problem = problem.with_effects(model.effects)
+    return fit(model_problem, model.theta, model.shot_parameters, spread=model.spread)
+
+
 def _centre_factors(problem: Problem, state: FitState) -> FitState:
     """Move what all friction factors have in common into mu_k, which leaves every trace as it is."""
     column = next(

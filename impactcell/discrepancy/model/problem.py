@@ -20,6 +20,7 @@ from impactcell.discrepancy.model.parameters import (
     plant_parameters,
 )
 from impactcell.discrepancy.model.reach import shots_reached
+from impactcell.discrepancy.model.shot_freedom import LARGEST_LOG_FACTOR, ShotFreedom
 from impactcell.discrepancy.model.shot_parameters import ShotParameters
 from impactcell.physics import LawKind
 from impactcell.physics.effects import find_effect
@@ -34,12 +35,8 @@ SMALLEST_SPEED_M_S = 1e-3
 """A speed is stepped as if it were at least this large [m/s]."""
 JUMP_FACTOR = 20.0
 """A sample that changes this many times more than its neighbours has been passed by a jump."""
-LARGEST_FACTOR_STEP, LARGEST_LOG_FACTOR = 0.7, 3.0
-"""Of the logarithm of a friction factor, in one step and in all: a factor of two, and of twenty."""
 ONSET_STEP_S = 1e-7
 """Step [s] of a finite difference by the moment of first contact: far below a sampling step."""
-LARGEST_MASS_STEP = 0.3
-"""Of the logarithm of a mass in one step."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +53,7 @@ class FitState:
     residual : ndarray, shape (N,)
         Whitened.
     cost : float
-        |r|² + sum (log f_i / s)²; infinite where the plant has no answer.
+        |r|² + sum (log f_i / s)², and what is told alike; infinite where the plant has no answer.
     """
 
     theta: Samples
@@ -103,14 +100,9 @@ class Problem:
             tuple(coordinate for effect in effects for coordinate in effect_coordinates(effect, self.batches))
         )
         self.penalty_matrix = constraints.penalty(self.coordinates)
-        self.unknown_mass = np.array([not math.isfinite(shot.mass_kg) for shot in shots.items])
-        self.unknown_mass &= shots.excitation.mass_is_visible
-        self.onset_step_s = np.array([shot.onset_step_s for shot in shots.items])
-        self.shot_parameter_names = (
-            *shots.excitation.shot_parameters,
-            *(("mass_kg",) if self.unknown_mass.any() else ()),
-            *(("onset_s",) if self.onset_step_s.any() else ()),
-        )
+        self.freedom = ShotFreedom.of(shots)
+        self.onset_step_s = self.freedom.onset_step_s
+        self.shot_parameter_names = self.freedom.names
 
     def with_effects(self, effects: tuple[str, ...]) -> "Problem":
         """Return another model on the same shots."""
@@ -148,7 +140,8 @@ class Problem:
         states = np.array([excitation.initial_state(shot, share) for shot in items])
         speed, shift = states[:, 0].copy(), states[:, 1].copy()
         zeros = np.zeros(self.count)
-        return ShotParameters(zeros, excitation.initial_mass(items), speed, shift, zeros.copy())
+        onset, velocity, mass = (zeros.copy() for _ in range(3))
+        return ShotParameters(zeros, excitation.initial_mass(items), speed, shift, onset, velocity, mass)
 
     def plant_parameters(self, theta: Samples) -> Samples:
         """Parameter vector of the plant at some coordinates."""
@@ -239,42 +232,22 @@ class Problem:
             steps[:, column] = size if name != "speed_m_s" else size * (speed != 0.0)
             if name == "onset_s":  # towards the middle of its range
                 steps[:, column] *= np.where(state.shot_parameters.onset_s > 0.0, -1.0, 1.0)
-            ahead = self.residual(state.theta, self.step_shot_parameters(state.shot_parameters, steps))
+            ahead = self.residual(state.theta, self.freedom.step(state.shot_parameters, steps))
             if name == "onset_s":
                 change = remove_jumps(state.residual - ahead)
                 jacobian[column] = change / np.repeat(steps[:, column], self.sizes)
             elif central:
-                back = self.residual(state.theta, self.step_shot_parameters(state.shot_parameters, -steps))
+                back = self.residual(state.theta, self.freedom.step(state.shot_parameters, -steps))
                 jacobian[column] = remove_jumps(back - ahead) / (2.0 * size)
             else:
                 jacobian[column] = remove_jumps(state.residual - ahead) / size
         return jacobian
 
-    def step_shot_parameters(self, shot_parameters: ShotParameters, steps: Samples) -> ShotParameters:
-        """Each shot's own numbers after steps of shape (n, q) in the order of `shot_parameter_names`."""
-        changed = {name: getattr(shot_parameters, name) for name in self.shot_parameter_names}
-        for column, name in enumerate(self.shot_parameter_names):
-            if name == "mass_kg":
-                factor = np.exp(np.clip(steps[:, column], -LARGEST_MASS_STEP, LARGEST_MASS_STEP))
-                changed[name] = np.where(self.unknown_mass, changed[name] * factor, changed[name])
-            elif name == "log_factor":
-                step = np.clip(steps[:, column], -LARGEST_FACTOR_STEP, LARGEST_FACTOR_STEP)
-                changed[name] = np.clip(changed[name] + step, -LARGEST_LOG_FACTOR, LARGEST_LOG_FACTOR)
-            elif name == "speed_m_s":
-                changed[name] = changed[name] + steps[:, column] * (changed[name] != 0.0)
-            elif name == "onset_s":
-                changed[name] = np.clip(
-                    changed[name] + steps[:, column], -self.onset_step_s, self.onset_step_s
-                )
-            else:
-                changed[name] = changed[name] + steps[:, column]
-        return replace(shot_parameters, **changed)
-
 
 def total_cost(residual: Samples, shot_parameters: ShotParameters, spread: float) -> float:
-    """Sum the squared misfit and the squared factors over their spread; infinite without an answer."""
+    """Sum the squared misfit and what shots have of their own over its spread; infinite without an answer."""
     misfit = float(np.einsum("i,i->", residual, residual))
-    cost = misfit + float(np.sum((shot_parameters.log_factor / spread) ** 2))
+    cost = misfit + float(np.sum(shot_parameters.cost(spread)))
     return cost if math.isfinite(cost) else math.inf
 
 

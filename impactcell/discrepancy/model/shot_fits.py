@@ -1,13 +1,13 @@
 """What belongs to one shot only, eliminated and refitted shot by shot: friction, speed, mass, onset."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from impactcell.discrepancy.data import IndexArray
 from impactcell.discrepancy.model.problem import FitState, Problem, total_cost
-from impactcell.discrepancy.model.shot_parameters import ShotParameters
+from impactcell.discrepancy.model.shot_parameters import STD_OF_TOLD, ShotParameters
 from impactcell.records import Samples
 
 THOROUGH_STEPS = 8
@@ -79,7 +79,7 @@ def fit_shot_parameters(problem: Problem, state: FitState, steps: int = FEW_STEP
         improved = state
         for scale in SHORTER_STEPS:
             # Shorter steps for the shots that the whole step did not help; the best so far is kept.
-            moved = problem.step_shot_parameters(state.shot_parameters, scale * shot_steps)
+            moved = problem.freedom.step(state.shot_parameters, scale * shot_steps)
             trial = problem.evaluate(state.theta, moved, state.spread)
             improved = better_per_shot(problem, improved, trial)
             if steps < THOROUGH_STEPS:
@@ -103,9 +103,9 @@ def correct_shot_parameters(
     if not trial.cost < math.inf:
         return trial
     gradient = np.add.reduceat(Jl * trial.residual, problem.shots.bounds[:-1], axis=1).T
-    gradient[:, 0] -= trial.shot_parameters.log_factor / trial.spread**2
+    gradient -= _pull(problem, trial)
     steps = np.einsum("iqr,ir->iq", equations.inverse, gradient)
-    moved = problem.step_shot_parameters(trial.shot_parameters, steps)
+    moved = problem.freedom.step(trial.shot_parameters, steps)
     return better_per_shot(problem, trial, problem.evaluate(trial.theta, moved, trial.spread))
 
 
@@ -114,14 +114,16 @@ def better_per_shot(problem: Problem, current: FitState, trial: FitState) -> Fit
 
     def cost_per_shot(state: FitState) -> Samples:
         misfit = np.add.reduceat(state.residual**2, problem.shots.bounds[:-1])
-        cost = misfit + (state.shot_parameters.log_factor / current.spread) ** 2
+        cost = misfit + state.shot_parameters.cost(current.spread)
         return np.nan_to_num(cost, nan=math.inf)
 
     better = cost_per_shot(trial) < cost_per_shot(current)
     shot_parameters = ShotParameters(
         *(
-            np.where(better, getattr(trial.shot_parameters, name), getattr(current.shot_parameters, name))
-            for name in ("log_factor", "mass_kg", "speed_m_s", "shift_m", "onset_s")
+            np.where(
+                better, getattr(trial.shot_parameters, item.name), getattr(current.shot_parameters, item.name)
+            )
+            for item in fields(ShotParameters)
         )
     )
     residual = np.where(np.repeat(better, problem.sizes), trial.residual, current.residual)
@@ -151,8 +153,8 @@ def normal_equations(
     A, C, gl = gram[:, :q, :q].copy(), gram[:, :q, q : q + p], gram[:, :q, -1].copy()
     whole = gram[:, q:, q:].sum(0)
     H, g = whole[:p, :p], whole[:p, -1]
-    A[:, 0, 0] += 1.0 / state.spread**2
-    gl[:, 0] -= state.shot_parameters.log_factor / state.spread**2
+    A[:, np.arange(q), np.arange(q)] += _weights(problem, state.spread)
+    gl -= _pull(problem, state)
     diagonal = np.einsum("iqq->iq", A)
     A[:, np.arange(q), np.arange(q)] += RIDGE * diagonal + (diagonal == 0.0)
     inverse = np.asarray(np.linalg.inv(A), dtype=np.float64)
@@ -160,6 +162,22 @@ def normal_equations(
     H = H - eliminated @ C.reshape(problem.count * q, p)
     g = g - eliminated @ gl.ravel()
     return H, g, ShotNormalEquations(inverse, C, gl)
+
+
+def _weights(problem: Problem, spread: float) -> Samples:
+    """One over the variance of what every shot has of its own, shape (q,); 0 where nothing is known of it."""
+    std = {"log_factor": spread, **STD_OF_TOLD}
+    return np.array([1.0 / std[name] ** 2 if name in std else 0.0 for name in problem.shot_parameter_names])
+
+
+def _pull(problem: Problem, state: FitState) -> Samples:
+    """Half the gradient, shape (n, q), of what it costs the shots to be far from what is known of them."""
+    std = {"log_factor": state.spread, **STD_OF_TOLD}
+    pull = np.zeros((problem.count, len(problem.shot_parameter_names)))
+    for column, name in enumerate(problem.shot_parameter_names):
+        if name in std:
+            pull[:, column] = getattr(state.shot_parameters, name) / std[name] ** 2
+    return pull
 
 
 def gram_of_shots(rows: Samples, bounds: IndexArray) -> Samples:

@@ -1,9 +1,12 @@
-"""What every shot of a set has of its own: friction factor, mass, initial speed, shift."""
+"""What every shot of a set has of its own: friction factor, mass, initial speed, shift, contact, settings."""
 
 from dataclasses import dataclass, fields
 
 from impactcell.discrepancy.data import IndexArray
-from impactcell.records import Samples
+from impactcell.records import MASS_STD, VELOCITY_STD, Samples
+
+STD_OF_TOLD = {"log_velocity": VELOCITY_STD, "log_mass": MASS_STD}
+"""Relative standard deviation with which what is told of a shot is known, where it is open."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -15,12 +18,15 @@ class ShotParameters:
     log_factor : ndarray
         Logarithm of the shot's friction factor.
     mass_kg : ndarray
+        As told; fitted where nothing is.
     speed_m_s : ndarray
         Initial speed; nan where an actuator strikes.
     shift_m : ndarray
         Added to the positions: error of the first sample, which a free slide counts from.
     onset_s : ndarray
         When first contact was, by the times of the samples: 0, unless it lies between two of them.
+    log_velocity, log_mass : ndarray
+        Logarithm of velocity and mass over what is told of them: 0, unless it is open.
     """
 
     log_factor: Samples
@@ -28,6 +34,16 @@ class ShotParameters:
     speed_m_s: Samples
     shift_m: Samples
     onset_s: Samples
+    log_velocity: Samples
+    log_mass: Samples
+
+    def cost(self, spread: float) -> Samples:
+        """Squared deviations, shape (n,), of the factors by their spread, of what is told by its error."""
+        told: Samples = sum(
+            ((getattr(self, name) / std) ** 2 for name, std in STD_OF_TOLD.items()),
+            (self.log_factor / spread) ** 2,
+        )
+        return told
 
     def select(self, places: IndexArray) -> "ShotParameters":
         """Return the numbers of some of the shots."""

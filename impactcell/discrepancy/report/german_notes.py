@@ -68,6 +68,10 @@ def _data_fault(match: re.Match[str]) -> str:
 
 AT_REST: Final = {"before contact": "vor dem Kontakt", "after the tap": "nach dem Stoß"}
 """When a part lies still."""
+SETTINGS: Final = {"velocity": "Die Geschwindigkeit", "mass": "Die Masse"}
+"""What is told of a shot."""
+LIKE: Final = {"velocity": "", "mass": "; eine Kraft mit falschem Maßstab sähe ebenso aus"}
+"""What looks the same."""
 NOTES: Final[Patterns] = (
     (r"Data, ([^:]+): (?:shot (\d+): )?(.*?)(?:; the like in (\d+) more shots)?\.", _data_fault),
     (r"The noise of (\w+) is not stated; (\S+ \S+) was .* at rest ([^,]+), (\S+) times .* state (\w+) of .*",
@@ -81,6 +85,13 @@ NOTES: Final[Patterns] = (
     (r"First contact lies (\S+) to (\S+) µs from t = 0, .*",
      (r"Der erste Kontakt liegt \1 bis \2 µs von t = 0, innerhalb eines Abtastschritts: "
       "er wird Stoß für Stoß angepasst.")),
+    (r"(Velocity|Mass) is off what is told by (\S+ %) in the mean, (\S+ %) from shot to shot: .*",
+     lambda m: f"{SETTINGS[m[1].lower()]} weicht im Mittel um {m[2]}, von Stoß zu Stoß um {m[3]} von der "
+     f"Angabe ab und wird Stoß für Stoß angepasst{LIKE[m[1].lower()]}."),
+    ((r"Nothing would remain if (velocity|mass) were off what is told by (\S+ %) in the mean, (\S+ %) "
+     r"from shot to shot, more than the (\S+ %) .*"),
+     lambda m: f"{SETTINGS[m[1]]}: nichts bliebe übrig, wenn sie im Mittel um {m[2]}, von Stoß zu Stoß um "
+     f"{m[3]} von der Angabe abwiche, mehr als die {m[4]}, die der Messung zugeschrieben werden: prüfen."),
     (r"The mass of shot (\d+) is not stated and is fitted, block by block\.",
      r"Die Masse zu Stoß \1 ist nicht angegeben und wird angepasst, Block für Block."),
     (r"(\d+) of (\d+) training blocks were left out: .*",

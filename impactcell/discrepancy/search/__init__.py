@@ -9,6 +9,7 @@ from impactcell.discrepancy.search.between_shots import (
 )
 from impactcell.discrepancy.search.candidate_fits import (
     fit_all_samples,
+    fit_between_shots,
     is_at_bound,
     refine,
     screen,
@@ -99,6 +100,7 @@ __all__ = [
     "estimate_model_error",
     "exchanged",
     "fit_all_samples",
+    "fit_between_shots",
     "is_at_bound",
     "missing_shots",
     "nested_models",

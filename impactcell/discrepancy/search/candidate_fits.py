@@ -19,6 +19,8 @@ from impactcell.discrepancy.search.indistinguishability import (
 )
 from impactcell.discrepancy.search.policy import POLICY
 from impactcell.errors import DiscrepancyError
+from impactcell.physics import Kind
+from impactcell.physics.effects import LIBRARY
 from impactcell.records import Samples
 
 AS_IT_STANDS = np.empty(0)
@@ -160,6 +162,18 @@ def fit_alike(context: SearchContext, scanned: CandidateScan, best: Fit, tried: 
                 scanned.candidates, scanned.scores, effect, POLICY.starts_per_effect
             )
             tasks.append(FitTask(model, tuple(starts), base, POLICY.final_steps))
+    return run_tasks(context, [task for task in tasks if task.starts])
+
+
+def fit_between_shots(context: SearchContext, scanned: CandidateScan) -> list[Fit]:
+    """Fit each effect that acts between shots, alone beside what the model has already."""
+    tasks = []
+    for effect in (name for name in scanned.gains() if LIBRARY[name].kind is Kind.BETWEEN_SHOTS):
+        starts = candidate_scores.starting_points(
+            scanned.candidates, scanned.scores, effect, POLICY.starts_per_effect
+        )
+        model = context.problem.with_effects((*scanned.fit.effects, effect))
+        tasks.append(FitTask(model, tuple(starts), scanned.fit, POLICY.final_steps))
     return run_tasks(context, [task for task in tasks if task.starts])
 
 

@@ -1,0 +1,166 @@
+"""Velocity and mass of a shot: as told, or, since they were measured, a little off in every shot."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from impactcell.discrepancy.data import PreparedShot
+from impactcell.discrepancy.model.least_squares import Fit
+from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.model.shot_fits import shot_equations
+from impactcell.discrepancy.model.shot_parameters import STD_OF_TOLD
+from impactcell.records import Samples
+
+SETTINGS = tuple(STD_OF_TOLD)
+"""What may be open, by its name among the shots' own numbers."""
+FEWEST_TO_SEE = 6
+"""Degrees of freedom of a scatter among like shots from which on it is looked at."""
+MIN_ERRORS = 5.0
+"""A scatter is seen from so many of its errors on: what a model lacks made 6 of them at most by itself, but
+for static friction that differs from shot to shot, which is named before."""
+PLAIN_ERRORS = 10.0
+"""From so many on it is plain, unless something that acts between shots takes it away."""
+CHANCE = 1e-3
+"""A scatter that goes with something else of the shots by less than this chance is not of the setting."""
+PLAUSIBLE_STD = 3.0
+"""Root mean square, in standard deviations of what is told, up to which a setting may be told wrong."""
+ROUNDING = 1e-9
+"""Relative difference among like shots that is none."""
+_WORDS = {"log_velocity": "Velocity", "log_mass": "Mass"}
+_LIKE = {"log_velocity": "", "log_mass": "; a force whose scale is off looks the same"}
+
+
+@dataclass(frozen=True, slots=True)
+class SettingScatter:
+    """How a setting scatters among shots that are told to be alike.
+
+    Attributes
+    ----------
+    std, error : float
+        Relative standard deviation, nan without replicates, and what noise makes of it by the gap there is.
+    degrees_of_freedom : int
+    chance : float
+        Of going so closely with anything else that differs among like shots, friction included.
+    """
+
+    std: float
+    error: float
+    degrees_of_freedom: int
+    chance: float
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether it scatters, and by itself."""
+        return self._is_larger_than(MIN_ERRORS)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it scatters beyond doubt, unless something is missing that acts between shots."""
+        return self._is_larger_than(PLAIN_ERRORS)
+
+    def _is_larger_than(self, errors: float) -> bool:
+        enough = self.degrees_of_freedom >= FEWEST_TO_SEE
+        return enough and self.std > errors * self.error and self.chance > CHANCE
+
+
+def with_open_settings(items: Sequence[PreparedShot], names: Sequence[str]) -> tuple[PreparedShot, ...]:
+    """Open velocity, mass or both of shots that tell them."""
+    return tuple(
+        replace(
+            shot,
+            velocity_is_open="log_velocity" in names,
+            mass_is_open="log_mass" in names and math.isfinite(shot.mass_kg),
+        )
+        for shot in items
+    )
+
+
+def setting_scatter(problem: Problem, fitted: Fit) -> dict[str, SettingScatter]:
+    """Scatter of velocity and mass about those of like shots, by one step from where they are as told.
+
+    What a model lacks moves them as well, but alike in like shots, or with what differs among them.
+    """
+    shots = replace(problem.shots, items=with_open_settings(problem.shots.items, SETTINGS))
+    model = Problem(shots, problem.batches, fitted.effects, problem.constraints)
+    equations = shot_equations(model, fitted.state)
+    steps = equations.steps(np.empty(0))
+    _, member = np.unique([shot.group for shot in shots.items], return_inverse=True)
+    degrees_of_freedom = len(shots) - int(member.max()) - 1
+    gap = max(math.sqrt(float(fitted.residual @ fitted.residual) / fitted.residual.size), 1.0)
+    log_factor = fitted.shot_parameters.log_factor + steps[:, 0]
+    beside = [_within(row, member) for row in (log_factor, *_covariates(shots.items))]
+    found = {}
+    for name in SETTINGS:
+        if name not in model.shot_parameter_names:
+            continue
+        column = model.shot_parameter_names.index(name)
+        own = _within(steps[:, column], member)
+        found[name] = SettingScatter(
+            math.sqrt(float(own @ own) / degrees_of_freedom) if degrees_of_freedom else math.nan,
+            math.sqrt(float(np.median(equations.inverse[:, column, column]))) * gap,
+            degrees_of_freedom,
+            _chance(own, beside, degrees_of_freedom),
+        )
+    return found
+
+
+def is_plausible(fitted: Fit) -> bool:
+    """Whether all that is open may have been told as it was."""
+    return all(_is_plausible(fitted, name, std) for name, std in STD_OF_TOLD.items())
+
+
+def setting_notes(fitted: Fit, names: Sequence[str]) -> tuple[str, ...]:
+    """Say of each setting that is open by how much it is off."""
+    return tuple(
+        f"{_WORDS[name]} is off what is told by {_off(fitted, name)}: it is fitted shot by shot{_LIKE[name]}."
+        for name in names
+    )
+
+
+def implausible_notes(fitted: Fit) -> tuple[str, ...]:
+    """Say which settings would have to be farther off than they may be told."""
+    return tuple(
+        f"Nothing would remain if {_WORDS[name].lower()} were off what is told by {_off(fitted, name)}, "
+        f"more than the {100.0 * PLAUSIBLE_STD * std:g} % that is put down to how it was measured: check it."
+        for name, std in STD_OF_TOLD.items()
+        if not _is_plausible(fitted, name, std)
+    )
+
+
+def _off(fitted: Fit, name: str) -> str:
+    off = 100.0 * np.expm1(getattr(fitted.shot_parameters, name))
+    return f"{off.mean():+.2f} % in the mean, {off.std():.2f} % from shot to shot"
+
+
+def _is_plausible(fitted: Fit, name: str, std: float) -> bool:
+    deviation = getattr(fitted.shot_parameters, name)
+    return math.sqrt(float(np.mean(deviation**2))) < PLAUSIBLE_STD * std
+
+
+def _covariates(items: Sequence[PreparedShot]) -> list[Samples]:
+    names = [name for name in items[0].covariates if name not in {"velocity", "mass"}]
+    rows = [np.array([shot.covariates.get(name, math.nan) for shot in items]) for name in names]
+    return [row for row in rows if np.isfinite(row).all()]
+
+
+def _within(values: Samples, member: np.ndarray) -> Samples:
+    """Take the mean of like shots away."""
+    within: Samples = values - (np.bincount(member, values) / np.bincount(member))[member]
+    within[np.abs(within) < ROUNDING * float(np.abs(values).max(initial=0.0))] = 0.0
+    return within
+
+
+def _chance(own: Samples, beside: Sequence[Samples], degrees_of_freedom: int) -> float:
+    """Chance of the closest correlation with any of the rows, shared among them."""
+    chances = []
+    for row in beside:
+        size = math.sqrt(float(row @ row) * float(own @ own))
+        if degrees_of_freedom < 2 or not size > 0.0:
+            continue
+        r = min(abs(float(row @ own)) / size, 1.0 - 1e-12)
+        t = r * math.sqrt((degrees_of_freedom - 1) / (1.0 - r * r))
+        chances.append(2.0 * float(stats.t.sf(t, degrees_of_freedom - 1)))
+    return min(1.0, len(chances) * min(chances, default=1.0))

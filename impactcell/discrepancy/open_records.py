@@ -1,0 +1,142 @@
+"""What a record tells of a shot is not exact: where it has to be open, and what is found beside that."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+from impactcell.discrepancy.model import SETTINGS, Fit, implausible_notes, is_plausible, setting_scatter
+from impactcell.discrepancy.nominal_model import NominalModel, NominalModels
+from impactcell.discrepancy.search import (
+    SearchContext,
+    SelectionResult,
+    fit_between_shots,
+    only_test,
+)
+
+VELOCITY = SETTINGS[0]
+"""What no effect of the library is about where all shots have it wrong alike, as one is of the mass."""
+Search = Callable[[SearchContext, Fit], SelectionResult]
+"""Looks for effects, or only tests the nominal model."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Basis:
+    """A nominal model, and what a search beside it found.
+
+    Attributes
+    ----------
+    nominals : NominalModels
+        With settings open as far as they scatter.
+    nominal : NominalModel
+        The one in use.
+    notes : tuple of str
+        What is to be said of others.
+    """
+
+    nominals: NominalModels
+    nominal: NominalModel
+    context: SearchContext
+    selection: SelectionResult
+    notes: tuple[str, ...] = ()
+
+    @property
+    def explains(self) -> bool:
+        """Whether nothing remains."""
+        return self.selection.accepted is not None and not self.selection.remains
+
+    @property
+    def best(self) -> Fit:
+        """What was accepted, else the nominal model."""
+        return self.selection.accepted or self.nominal.fit
+
+    def notes_of(self, final: Fit) -> tuple[str, ...]:
+        """Say what is open, by the model that is left in the end."""
+        return (*self.nominal.notes(final), *self.notes)
+
+
+def find_basis(context: SearchContext, nominals: NominalModels, search: Search) -> Basis:
+    """Search beside the nominal model, or beside one that is open in first contact, velocity or mass.
+
+    Velocity and mass are open from the start where it is plain that they scatter among like shots. Where
+    something remains they are so, too, where that is seen less plainly. Anything else has to explain the
+    shots: open contact, velocity and mass alone, which are looked at first, and then effects beside open
+    contact, where too few replicates say that contact is at t = 0, and beside velocities that are told a
+    little wrong.
+    """
+    if not nominals.exact.prepared.excitation.has_contact:
+        return _beside(context, nominals, nominals.start, search)
+    opened = _plainly_scattered(context, nominals)
+    if opened:
+        nominals = nominals.with_settings(opened)
+    basis = _beside(context, nominals, nominals.start, search)
+    while seen := _scattered(basis):
+        nominals = nominals.with_settings(seen)
+        basis = _beside(context, nominals, nominals.start, search)
+    if basis.explains:
+        return basis
+    for nominal, looks in _others(nominals, search):
+        other = _beside(context, nominals, nominal, looks)
+        if other.explains and is_plausible(nominal.fit):
+            return other
+        if other.explains:
+            return replace(basis, notes=implausible_notes(nominal.fit))
+    return basis
+
+
+def _beside(context: SearchContext, nominals: NominalModels, nominal: NominalModel, search: Search) -> Basis:
+    context = _on(context, nominal)
+    return Basis(nominals, nominal, context, search(context, nominal.fit))
+
+
+def _on(context: SearchContext, nominal: NominalModel) -> SearchContext:
+    return replace(context, problem=nominal.problem, coarse=nominal.coarse, prepared=nominal.prepared)
+
+
+def _plainly_scattered(context: SearchContext, nominals: NominalModels) -> tuple[str, ...]:
+    """Name the settings whose scatter among like shots nothing takes away that acts between shots."""
+    exact = nominals.exact
+    plain = [name for name, one in setting_scatter(exact.problem, exact.fit).items() if one.is_plain]
+    if not plain:
+        return ()
+    beside = _on(context, exact)
+    for model in fit_between_shots(beside, beside.test_model(exact.fit).candidate_scan):
+        scatter = setting_scatter(exact.problem, model)
+        plain = [name for name in plain if scatter[name].is_plain]
+    return tuple(plain)
+
+
+def _scattered(basis: Basis) -> tuple[str, ...]:
+    """Name the settings that are open and those that scatter among like shots, if there are more.
+
+    One that scatters much hides another: what is seen is open before the next look.
+    """
+    if basis.explains:
+        return ()
+    already = basis.nominals.exact.opened
+    opened, problem, best = already, basis.nominal.problem, basis.best
+    while more := [
+        name for name, one in setting_scatter(problem, best).items() if one.is_seen and name not in opened
+    ]:
+        opened = (*opened, *more)
+        start = basis.nominals.with_settings(opened).start
+        problem, best = start.problem, start.fit
+    return opened if opened != already else ()
+
+
+def _others(nominals: NominalModels, search: Search) -> Iterator[tuple[NominalModel, Search]]:
+    """List what else may explain the shots, the least first."""
+    opened = nominals.exact.opened
+    yield from ((nominal, only_test) for nominal in _other_contact(nominals))
+    if set(opened) != set(SETTINGS):
+        all_open = nominals.with_settings(SETTINGS)
+        yield all_open.start, only_test
+        yield from ((nominal, only_test) for nominal in _other_contact(all_open))
+    if nominals.scatter is not None and nominals.scatter.is_open:
+        yield from ((nominal, search) for nominal in _other_contact(nominals))
+    if VELOCITY not in opened:
+        yield nominals.with_settings((VELOCITY, *opened)).start, search
+
+
+def _other_contact(nominals: NominalModels) -> Iterator[NominalModel]:
+    """Give the model with first contact open, where it is not open from the start."""
+    if nominals.contact_free is not None and nominals.contact_free is not nominals.start:
+        yield nominals.contact_free
