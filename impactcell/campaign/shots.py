@@ -9,9 +9,8 @@ from pathlib import Path
 
 from impactcell.campaign.contents import COLUMNS, Coordinate, Excitation
 from impactcell.campaign.faults import LARGEST, Faults, read_text
+from impactcell.records import MM_PER_MIN
 
-MM_PER_MIN = 1e-3 / 60.0
-"""One millimetre per minute in m/s."""
 LARGEST_SHOT = 2**53
 """Number of a shot beyond which not every whole number has a double."""
 

@@ -9,10 +9,9 @@ import numpy as np
 
 from impactcell.campaign.contents import CHANNELS, COLUMNS, Campaign, Coordinate
 from impactcell.campaign.header import FORMAT
-from impactcell.campaign.shots import MM_PER_MIN
 from impactcell.errors import CampaignError
 from impactcell.process.whole_files import directory_beside
-from impactcell.records import Capture, Channel
+from impactcell.records import MM_PER_MIN, Capture, Channel
 
 
 def write(campaign: Campaign, directory: Path) -> None:

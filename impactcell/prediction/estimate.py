@@ -11,15 +11,13 @@ from impactcell.prediction.mass_interpolation import interpolate_mass
 from impactcell.prediction.model import Model
 from impactcell.prediction.phase_reweighting import MISFIT_THRESHOLD
 from impactcell.prediction.waveform import WaveformFit, deceleration_friction, fit
-from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, Quality
+from impactcell.records import MM_PER_MIN, Capture, Coefficient, Estimator, FrictionEstimate, Quality
 
 NO_FEATURE = MeasuredFeature(math.nan, math.nan)
 SUMMARY_RELATIVE_STD = 0.01
 """Relative standard deviation of what the module reports without one: our choice, for it says nothing."""
 MAX_DEVIATION = 3.0
 """Standard deviations by which what was told may be off: 3 % of mass and scale, 1.5 % of velocity."""
-MM_PER_MIN = 60_000.0
-"""Millimetres per minute in a metre per second."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +149,7 @@ def _told_otherwise(capture: Capture, waveform: WaveformFit) -> list[str]:
         mass_kg = capture.mass_kg * math.exp(capture.mass_std * off[MASS])
         said.append(f"the tap is that of {mass_kg:.4g} kg, not {capture.mass_kg:.4g} kg: check the mass")
     if abs(off[VELOCITY]) > MAX_DEVIATION:
-        told = MM_PER_MIN * capture.velocity_m_s
+        told = capture.velocity_m_s / MM_PER_MIN
         shown = told * math.exp(capture.velocity_std * off[VELOCITY])
         said.append(f"the tap is that of {shown:.0f} mm/min, not {told:.0f} mm/min: check the velocity")
     if abs(off[FORCE_SCALE]) > MAX_DEVIATION:

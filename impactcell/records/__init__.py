@@ -30,10 +30,12 @@ from impactcell.records.friction import (
 )
 from impactcell.records.module import BatchAnnouncement, CycleId, ModuleStatus
 from impactcell.records.snapshot import PositioningState, Snapshot, TapPredictions
+from impactcell.records.units import MM_PER_MIN
 
 __all__ = [
     "FORCE_SCALE_STD",
     "MASS_STD",
+    "MM_PER_MIN",
     "VELOCITY_STD",
     "Alarm",
     "BatchAnnouncement",

@@ -11,6 +11,7 @@ from impactcell.cell import CellDesign
 from impactcell.cell.preprocessing import CaptureDefaults
 from impactcell.fieldbus.link import ModuleLink, SerialLine, TlsFiles
 from impactcell.journal.retention import Retention
+from impactcell.records import MM_PER_MIN
 from impactcell.scada import (
     CellDescription,
     Machine,
@@ -26,7 +27,7 @@ from impactcell.tracking.signature.tracker import SignatureSettings
 from impactcell.tracking.wear_batch import BatchKnowledge, TrackerSettings
 from impactcell.web.interface import CellFacts, PageSettings
 
-MM, UM, MM_PER_MIN = 1e-3, 1e-6, 1e-3 / 60.0
+MM, UM = 1e-3, 1e-6
 """SI units of what a cell file is written in."""
 COMMISSIONED_APART = 32
 """Cycles over which cells begun together look for random walks, each at one that follows from its name: 9 ms

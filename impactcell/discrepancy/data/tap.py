@@ -19,7 +19,7 @@ from impactcell.discrepancy.data.prepared_shots import (
     ShotSet,
 )
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio
-from impactcell.records import Capture, Channel, since_contact
+from impactcell.records import MM_PER_MIN, Capture, Channel, since_contact
 
 SPEED_RATIO = PlausibleRatio(
     0.05, 20.0, "the part's speed over the actuator's velocity", "position_m, time_s or velocity_mm_per_min"
@@ -48,8 +48,6 @@ FASTER, SLOWER, HEAVIER = 1.3, 0.7, 1.5
 """Factors of velocity and mass by which a next experiment may leave the range that was covered."""
 DWELLS_S = (1.0, 1000.0)
 """Dwells [s] that a next experiment may take, three decades apart."""
-MM_PER_MIN = 60_000.0
-"""Millimetres per minute in a metre per second."""
 
 
 class Tap(ExcitationStrategy):
@@ -159,7 +157,7 @@ class Tap(ExcitationStrategy):
         for velocity in (velocities[0] * SLOWER, velocities[0], velocities[-1], velocities[-1] * FASTER):
             for mass in (masses[0], masses[-1], masses[-1] * HEAVIER):
                 for direction in (1, -1):
-                    words = f"{velocity * MM_PER_MIN:.0f} mm/min, {mass:.3g} kg, direction {direction:+d}"
+                    words = f"{velocity / MM_PER_MIN:.0f} mm/min, {mass:.3g} kg, direction {direction:+d}"
                     shot = replace(
                         typical, velocity_m_s=velocity, mass_kg=mass, direction=direction, group=-1
                     )

@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from impactcell.discrepancy.data import BETWEEN_SHOTS, CHANNELS
 from impactcell.discrepancy.search import ALL, ModelEvidence
 from impactcell.discrepancy.workflow import DiscrepancyResult
+from impactcell.records import MM_PER_MIN
 
 UNITS = ("N", "mm", "mm")
 SCALES = (1.0, 1e3, 1e3)
@@ -191,7 +192,7 @@ def _moving_average(values: np.ndarray, step: int) -> np.ndarray:
 def _setting(shot: Any, said: ModuleType) -> str:
     parts = [f"{said.label('shot')} {shot.number}"]
     if np.isfinite(shot.velocity_m_s):
-        parts.append(f"{shot.velocity_m_s * 6e4:.0f} mm/min")
+        parts.append(f"{shot.velocity_m_s / MM_PER_MIN:.0f} mm/min")
     if np.isfinite(shot.mass_kg):
         parts.append(said.written(f"{shot.mass_kg:.3g} kg"))
     parts.append("+" if shot.direction > 0 else "−")
