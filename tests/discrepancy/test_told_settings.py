@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from impactcell.discrepancy.model.shot_fits import shot_equations
 from impactcell.discrepancy.model.shot_parameters import STD_OF_TOLD
 from impactcell.discrepancy.nominal_model import NominalModels, nominal_models
 from impactcell.discrepancy.report.german_notes import note
+from impactcell.discrepancy.report.page import write_report
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.records import Samples
 from simulator.campaign import MadeShot, make
@@ -74,7 +76,7 @@ def test_scatter_from_shot_to_shot_is_found_in_every_shot_and_is_no_gap(actuator
         assert scatter == pytest.approx(100.0 * truth.std(), rel=0.2)
 
 
-def test_an_effect_is_named_beside_scatter() -> None:
+def test_an_effect_is_named_beside_scatter(tmp_path: Path) -> None:
     job = Job("single", ("hertz_contact",), 7_090_002, shots=40)
     found, _ = found_in(job, velocity_scatter=0.002, mass_scatter=0.003)
     assert (found.verdict, found.added) == ("named", ("hertz_contact",))
@@ -83,6 +85,12 @@ def test_an_effect_is_named_beside_scatter() -> None:
     (of_mass,) = (one for one in found.prepared.notes if one.startswith("Mass"))
     assert of_mass.endswith("a force whose scale is off looks the same.")
     assert all(note(one)[0] == "de" for one in found.prepared.notes)
+    for language, own in (
+        ("en", "of its own was fitted to them: friction factor, velocity, mass."),
+        ("de", "was jeder Stoß für sich hat: Reibungsfaktor, Geschwindigkeit, Masse."),
+    ):
+        write_report(found, "shots", tmp_path / "report.html", language)
+        assert own in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_a_velocity_that_is_wrong_alike_in_all_shots_is_no_gap() -> None:
