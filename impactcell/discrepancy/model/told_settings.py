@@ -109,13 +109,15 @@ def setting_scatter(problem: Problem, fitted: Fit) -> dict[str, SettingScatter]:
 
 def is_plausible(fitted: Fit) -> bool:
     """Whether all that is open may have been told as it was."""
-    return all(_is_plausible(fitted, name, std) for name, std in STD_OF_TOLD.items())
+    return all(_is_plausible(fitted, name) for name in SETTINGS)
 
 
 def setting_notes(fitted: Fit, names: Sequence[str]) -> tuple[str, ...]:
     """Say of each setting that is open by how much it is off."""
     return tuple(
-        f"{_WORDS[name]} is off what is told by {_off(fitted, name)}: it is fitted shot by shot{_LIKE[name]}."
+        f"{_WORDS[name]} is off what is told by {_off(fitted, name)}"
+        + ("" if _is_plausible(fitted, name) else f", {_more_than(name)}")
+        + f": it is fitted shot by shot{_LIKE[name]}."
         for name in names
     )
 
@@ -124,10 +126,15 @@ def implausible_notes(fitted: Fit) -> tuple[str, ...]:
     """Say which settings would have to be farther off than they may be told."""
     return tuple(
         f"Nothing would remain if {_WORDS[name].lower()} were off what is told by {_off(fitted, name)}, "
-        f"more than the {100.0 * PLAUSIBLE_STD * std:g} % that is put down to how it was measured: check it."
-        for name, std in STD_OF_TOLD.items()
-        if not _is_plausible(fitted, name, std)
+        f"{_more_than(name)}: check it."
+        for name in SETTINGS
+        if not _is_plausible(fitted, name)
     )
+
+
+def _more_than(name: str) -> str:
+    limit = 100.0 * PLAUSIBLE_STD * STD_OF_TOLD[name]
+    return f"more than the {limit:g} % that is put down to how it was measured"
 
 
 def _off(fitted: Fit, name: str) -> str:
@@ -135,9 +142,9 @@ def _off(fitted: Fit, name: str) -> str:
     return f"{off.mean():+.2f} % in the mean, {off.std():.2f} % from shot to shot"
 
 
-def _is_plausible(fitted: Fit, name: str, std: float) -> bool:
+def _is_plausible(fitted: Fit, name: str) -> bool:
     deviation = getattr(fitted.shot_parameters, name)
-    return math.sqrt(float(np.mean(deviation**2))) < PLAUSIBLE_STD * std
+    return math.sqrt(float(np.mean(deviation**2))) < PLAUSIBLE_STD * STD_OF_TOLD[name]
 
 
 def _covariates(items: Sequence[PreparedShot]) -> list[Samples]:

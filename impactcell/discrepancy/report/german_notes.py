@@ -85,9 +85,11 @@ NOTES: Final[Patterns] = (
     (r"First contact lies (\S+) to (\S+) µs from t = 0, .*",
      (r"Der erste Kontakt liegt \1 bis \2 µs von t = 0, innerhalb eines Abtastschritts: "
       "er wird Stoß für Stoß angepasst.")),
-    (r"(Velocity|Mass) is off what is told by (\S+ %) in the mean, (\S+ %) from shot to shot: .*",
+    ((r"(Velocity|Mass) is off what is told by (\S+ %) in the mean, (\S+ %) from shot to shot"
+      r"(?:, more than the (\S+ %) .*)?: it is fitted .*"),
      lambda m: f"{SETTINGS[m[1].lower()]} weicht im Mittel um {m[2]}, von Stoß zu Stoß um {m[3]} von der "
-     f"Angabe ab und wird Stoß für Stoß angepasst{LIKE[m[1].lower()]}."),
+     + (f"Angabe ab, mehr als die {m[4]}, die der Messung zugeschrieben werden, " if m[4] else "Angabe ab ")
+     + f"und wird Stoß für Stoß angepasst{LIKE[m[1].lower()]}."),
     ((r"Nothing would remain if (velocity|mass) were off what is told by (\S+ %) in the mean, (\S+ %) "
      r"from shot to shot, more than the (\S+ %) .*"),
      lambda m: f"{SETTINGS[m[1]]}: nichts bliebe übrig, wenn sie im Mittel um {m[2]}, von Stoß zu Stoß um "
