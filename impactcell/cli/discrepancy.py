@@ -1,5 +1,6 @@
 """`impactcell discrepancy`: where model and measurement disagree, and what is missing."""
 
+import json
 import os
 import sys
 from collections.abc import Iterator
@@ -18,7 +19,7 @@ from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError, DiscrepancyError
 from impactcell.physics import Plant
 from impactcell.prediction import Model
-from impactcell.process.console import print_result
+from impactcell.process.console import print_note, print_result
 from impactcell.process.extras import how_to_install
 from impactcell.process.progress import named_steps
 
@@ -79,10 +80,7 @@ def discrepancy(
             result = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=report_step)
         report_step("writing the report")
         write_findings(result, data, output, source, name)
-    if as_json:
-        sys.stdout.write((output / "result.json").read_text(encoding="utf-8"))
-    else:
-        print_result(f"{headline(result)}\n{output / 'report.html'}")
+    _print_outcome(output, headline(result), as_json=as_json)
 
 
 def discrepancy_of_machine(
@@ -119,10 +117,18 @@ def discrepancy_of_machine(
             finding = investigate_with_base(data, base, patterns, seed)
         report_step("writing the report")
         write_machine_findings(finding, data, output, str(campaign.name))
+    _print_outcome(output, machine_headline(finding), as_json=as_json)
+
+
+def _print_outcome(output: Path, said: str, *, as_json: bool) -> None:
+    """Print result.json, or its verdict, what was noted on the way, and where the report is."""
+    text = (output / "result.json").read_text(encoding="utf-8")
     if as_json:
-        sys.stdout.write((output / "result.json").read_text(encoding="utf-8"))
-    else:
-        print_result(f"{machine_headline(finding)}\n{output / 'report.html'}")
+        sys.stdout.write(text)
+        return
+    for one in json.loads(text)["notes"]:
+        print_note(f"note: {one}")
+    print_result(f"{said}\n{output / 'report.html'}")
 
 
 def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> tuple[str, Campaign]:

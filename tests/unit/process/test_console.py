@@ -38,17 +38,34 @@ def test_export(
     assert (tmp_path / "c" / "shots.csv").exists()
 
 
-@pytest.mark.parametrize(("options", "said"), [((), "Missing: x\nout/report.html\n"), (("-q",), "")])
+@pytest.mark.parametrize(
+    ("options", "said", "noted"),
+    [
+        ((), "Missing: x\nout/report.html\n", "note: one mass only\n"),
+        (("-q",), "", ""),
+        (("--json",), '{"notes": ["one mass only"]}', ""),
+    ],
+)
 def test_discrepancy(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
     options: tuple[str, ...],
     said: str,
+    noted: str,
 ) -> None:
-    for name, made in (("_read", ("name", None)), ("investigate", None), ("write_findings", None)):
+    monkeypatch.chdir(tmp_path)
+    for name, made in (("_read", ("name", None)), ("investigate", None)):
         monkeypatch.setattr(command, name, lambda *_, made=made, **__: made)
+
+    def write_findings(_result: object, _data: object, output: Path, *_: object) -> None:
+        output.mkdir()
+        (output / "result.json").write_text('{"notes": ["one mass only"]}', encoding="utf-8")
+
+    monkeypatch.setattr(command, "write_findings", write_findings)
     monkeypatch.setattr(command, "headline", lambda _: "Missing: x")
-    assert run(capsys, "discrepancy", "shots", "-o", "out", *options) == said
+    app(["discrepancy", "shots", "-o", "out", *options], standalone_mode=False)
+    assert capsys.readouterr() == (said, noted)
 
 
 @pytest.mark.parametrize(("level", "said"), [(logging.INFO, "2 left out\n"), (logging.ERROR, "")])
