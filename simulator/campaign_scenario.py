@@ -139,6 +139,13 @@ class CampaignScenario(ScenarioModel):
     hide: list[str] = Field([])
     strengths: dict[str, dict[str, Strength]] = Field({})
 
+    @model_validator(mode="after")
+    def _told_is_of_taps(self) -> Self:
+        if self.excitation != "tap" and self.told != ToldScenario():
+            message = "told is about taps: leave it out"
+            raise ValueError(message)
+        return self
+
     @field_validator("dwell_s", mode="before")
     @classmethod
     def _as_pair(cls, value: object) -> object:

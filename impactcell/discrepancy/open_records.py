@@ -10,6 +10,7 @@ from impactcell.discrepancy.search import (
     SelectionResult,
     fit_between_shots,
     only_test,
+    scan_candidates,
 )
 
 VELOCITY = SETTINGS[0]
@@ -56,15 +57,15 @@ class Basis:
 def find_basis(context: SearchContext, nominals: NominalModels, search: Search) -> Basis:
     """Search beside the nominal model, or beside one that is open in first contact, velocity or mass.
 
-    Velocity and mass are open from the start where it is plain that they scatter among like shots. Where
-    something remains they are so, too, where that is seen less plainly. Anything else has to explain the
-    shots: open contact, velocity and mass alone, which are looked at first, and then effects beside open
-    contact, where too few replicates say that contact is at t = 0, and beside velocities that are told a
-    little wrong.
+    Velocity and mass are open from the start where they scatter among like shots, whatever acts between
+    shots; where something remains they are so, too, where that is seen beside what was found. Anything else
+    has to explain the shots: open contact, velocity and mass alone, which are looked at first, and then
+    effects beside open contact, where too few replicates say that contact is at t = 0, and beside velocities
+    that are told a little wrong.
     """
     if not nominals.exact.prepared.excitation.has_contact:
         return _beside(context, nominals, nominals.start, search)
-    opened = _plainly_scattered(context, nominals)
+    opened = _scattered_at_first(context, nominals)
     if opened:
         nominals = nominals.with_settings(opened)
     basis = _beside(context, nominals, nominals.start, search)
@@ -73,13 +74,16 @@ def find_basis(context: SearchContext, nominals: NominalModels, search: Search) 
         basis = _beside(context, nominals, nominals.start, search)
     if basis.explains:
         return basis
+    already = nominals.exact.opened
+    notes: tuple[str, ...] = ()
     for nominal, looks in _others(nominals, search):
         other = _beside(context, nominals, nominal, looks)
-        if other.explains and is_plausible(nominal.fit):
+        new = [name for name in SETTINGS if name in nominal.opened and name not in already]
+        if other.explains and is_plausible(other.best, new):
             return other
-        if other.explains:
-            return replace(basis, notes=implausible_notes(nominal.fit))
-    return basis
+        if other.explains and not notes:
+            notes = implausible_notes(other.best, new)
+    return replace(basis, notes=notes)
 
 
 def _beside(context: SearchContext, nominals: NominalModels, nominal: NominalModel, search: Search) -> Basis:
@@ -91,17 +95,18 @@ def _on(context: SearchContext, nominal: NominalModel) -> SearchContext:
     return replace(context, problem=nominal.problem, coarse=nominal.coarse, prepared=nominal.prepared)
 
 
-def _plainly_scattered(context: SearchContext, nominals: NominalModels) -> tuple[str, ...]:
-    """Name the settings whose scatter among like shots nothing takes away that acts between shots."""
-    exact = nominals.exact
-    plain = [name for name, one in setting_scatter(exact.problem, exact.fit).items() if one.is_plain]
-    if not plain:
+def _scattered_at_first(context: SearchContext, nominals: NominalModels) -> tuple[str, ...]:
+    """Name the settings whose scatter among like shots no effect that acts between shots takes away."""
+    start = nominals.start
+    seen = [name for name, one in setting_scatter(start.problem, start.fit).items() if one.is_seen]
+    if not seen:
         return ()
-    beside = _on(context, exact)
-    for model in fit_between_shots(beside, beside.test_model(exact.fit).candidate_scan):
-        scatter = setting_scatter(exact.problem, model)
-        plain = [name for name in plain if scatter[name].is_plain]
-    return tuple(plain)
+    beside = _on(context, start)
+    scanned = scan_candidates(beside.coarse, start.fit, beside.library, (beside.seed, 0))
+    for model in fit_between_shots(beside, scanned):
+        scatter = setting_scatter(start.problem, model)
+        seen = [name for name in seen if scatter[name].is_seen]
+    return tuple(seen)
 
 
 def _scattered(basis: Basis) -> tuple[str, ...]:

@@ -42,6 +42,7 @@ from impactcell.discrepancy.model.told_settings import (
     is_plausible,
     setting_notes,
     setting_scatter,
+    settings_on_average,
     with_open_settings,
 )
 
@@ -85,6 +86,7 @@ __all__ = [
     "scores",
     "setting_notes",
     "setting_scatter",
+    "settings_on_average",
     "simulate_open_loop",
     "trajectory_of",
     "unmet_gradient",

@@ -1,7 +1,8 @@
-"""Least squares with every shot's own friction factor eliminated inside every step.
+"""Least squares with every shot's own numbers eliminated inside every step.
 
-Minimised is |r|² + sum (log f_i / s)²: the whitened residuals of all traces, and the spread s of the friction
-factors about one. Numbers that belong to one shot only (friction factor, initial speed, unknown mass) are
+Minimised is |r|² + sum (log f_i / s)²: the whitened residuals of all traces, and the spread s of the
+friction factors about one; alike a velocity or a mass that is open, by what is told and the error of that.
+Numbers that belong to one shot only (friction factor, initial speed, contact, settings, unknown mass) are
 eliminated shot by shot, so that the system to solve is no larger than the shared parameters (variable
 projection on a block-arrow matrix), and refitted after every trial step: without that fits stall.
 """

@@ -2,7 +2,9 @@
 
 Every shot's own numbers are projected out of everything first, then the shared parameters; what is left of a
 direction is what the fitted model cannot do. Each shot has one row more than samples, its friction factor
-over the factors' spread, so that effects between shots are directions like any other.
+over the factors' spread, so that effects between shots are directions like any other. A velocity or a mass
+that is open is projected out as if nothing were told of it: what all shots have wrong alike would count n
+times.
 """
 
 from dataclasses import dataclass

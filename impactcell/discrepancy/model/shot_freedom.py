@@ -50,6 +50,8 @@ class ShotFreedom:
             "log_velocity": np.array([shot.velocity_is_open for shot in shots.items]),
             "log_mass": np.array([shot.mass_is_open for shot in shots.items]),
         }
+        if not shots.excitation.has_contact:
+            is_open = {name: np.zeros_like(those) for name, those in is_open.items()}
         names = (
             *shots.excitation.shot_parameters,
             *(("mass_kg",) if unknown_mass.any() else ()),

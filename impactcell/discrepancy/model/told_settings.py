@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
-from impactcell.discrepancy.data import PreparedShot
+from impactcell.discrepancy.data import FORCE, PreparedShot
 from impactcell.discrepancy.model.least_squares import Fit
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.discrepancy.model.shot_fits import shot_equations
@@ -19,10 +19,8 @@ SETTINGS = tuple(STD_OF_TOLD)
 FEWEST_TO_SEE = 6
 """Degrees of freedom of a scatter among like shots from which on it is looked at."""
 MIN_ERRORS = 5.0
-"""A scatter is seen from so many of its errors on: what a model lacks made 6 of them at most by itself, but
-for static friction that differs from shot to shot, which is named before."""
-PLAIN_ERRORS = 10.0
-"""From so many on it is plain, unless something that acts between shots takes it away."""
+"""A scatter is seen from so many of its errors on: what a model lacks made 4.1 of them at most by itself, but
+for static friction that goes with dwell, an effect that acts between shots."""
 CHANCE = 1e-3
 """A scatter that goes with something else of the shots by less than this chance is not of the setting."""
 PLAUSIBLE_STD = 3.0
@@ -54,28 +52,36 @@ class SettingScatter:
     @property
     def is_seen(self) -> bool:
         """Whether it scatters, and by itself."""
-        return self._is_larger_than(MIN_ERRORS)
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether it scatters beyond doubt, unless something is missing that acts between shots."""
-        return self._is_larger_than(PLAIN_ERRORS)
-
-    def _is_larger_than(self, errors: float) -> bool:
         enough = self.degrees_of_freedom >= FEWEST_TO_SEE
-        return enough and self.std > errors * self.error and self.chance > CHANCE
+        return enough and self.std > MIN_ERRORS * self.error and self.chance > CHANCE
 
 
 def with_open_settings(items: Sequence[PreparedShot], names: Sequence[str]) -> tuple[PreparedShot, ...]:
-    """Open velocity, mass or both of shots that tell them."""
+    """Open velocity, mass or both of shots that tell them.
+
+    Motion alone shows mass over stiffness only: without a force a mass stays as told.
+    """
     return tuple(
         replace(
             shot,
             velocity_is_open="log_velocity" in names,
-            mass_is_open="log_mass" in names and math.isfinite(shot.mass_kg),
+            mass_is_open="log_mass" in names and math.isfinite(shot.mass_kg) and bool(shot.times[FORCE].size),
         )
         for shot in items
     )
+
+
+def settings_on_average(problem: Problem, model: Fit) -> Problem:
+    """Tell shots what a model has found their settings to be off in the mean, and open none."""
+    velocity, mass = (math.exp(float(_of_open(model, name).mean())) for name in SETTINGS)
+    items = tuple(
+        replace(shot, velocity_m_s=velocity * shot.velocity_m_s, mass_kg=mass * shot.mass_kg)
+        if shot.velocity_is_open or shot.mass_is_open
+        else shot
+        for shot in problem.shots.items
+    )
+    shots = replace(problem.shots, items=with_open_settings(items, ()))
+    return Problem(shots, problem.batches, problem.effects, problem.constraints)
 
 
 def setting_scatter(problem: Problem, fitted: Fit) -> dict[str, SettingScatter]:
@@ -87,33 +93,33 @@ def setting_scatter(problem: Problem, fitted: Fit) -> dict[str, SettingScatter]:
     model = Problem(shots, problem.batches, fitted.effects, problem.constraints)
     equations = shot_equations(model, fitted.state)
     steps = equations.steps(np.empty(0))
-    _, member = np.unique([shot.group for shot in shots.items], return_inverse=True)
-    degrees_of_freedom = len(shots) - int(member.max()) - 1
     gap = max(math.sqrt(float(fitted.residual @ fitted.residual) / fitted.residual.size), 1.0)
-    log_factor = fitted.shot_parameters.log_factor + steps[:, 0]
-    beside = [_within(row, member) for row in (log_factor, *_covariates(shots.items))]
+    rows = np.array([fitted.shot_parameters.log_factor + steps[:, 0], *_covariates(shots.items)])
+    group = np.array([shot.group for shot in shots.items])
     found = {}
-    for name in SETTINGS:
-        if name not in model.shot_parameter_names:
-            continue
+    for name in (name for name in SETTINGS if name in model.shot_parameter_names):
         column = model.shot_parameter_names.index(name)
-        own = _within(steps[:, column], member)
+        those = model.freedom.is_open[name]
+        _, member = np.unique(group[those], return_inverse=True)
+        degrees_of_freedom = len(member) - int(member.max()) - 1
+        beside = [_within(row[those], member) for row in rows]
+        own = _within(steps[those, column], member)
         found[name] = SettingScatter(
             math.sqrt(float(own @ own) / degrees_of_freedom) if degrees_of_freedom else math.nan,
-            math.sqrt(float(np.median(equations.inverse[:, column, column]))) * gap,
+            math.sqrt(float(np.median(equations.inverse[those, column, column]))) * gap,
             degrees_of_freedom,
             _chance(own, beside, degrees_of_freedom),
         )
     return found
 
 
-def is_plausible(fitted: Fit) -> bool:
-    """Whether all that is open may have been told as it was."""
-    return all(_is_plausible(fitted, name) for name in SETTINGS)
+def is_plausible(fitted: Fit, names: Sequence[str] = SETTINGS) -> bool:
+    """Whether settings may have been told as they were."""
+    return all(_is_plausible(fitted, name) for name in names)
 
 
 def setting_notes(fitted: Fit, names: Sequence[str]) -> tuple[str, ...]:
-    """Say of each setting that is open by how much it is off."""
+    """Say of each of some settings by how much it is off."""
     return tuple(
         f"{_WORDS[name]} is off what is told by {_off(fitted, name)}"
         + ("" if _is_plausible(fitted, name) else f", {_more_than(name)}")
@@ -122,12 +128,12 @@ def setting_notes(fitted: Fit, names: Sequence[str]) -> tuple[str, ...]:
     )
 
 
-def implausible_notes(fitted: Fit) -> tuple[str, ...]:
-    """Say which settings would have to be farther off than they may be told."""
+def implausible_notes(fitted: Fit, names: Sequence[str]) -> tuple[str, ...]:
+    """Say which of some settings would have to be farther off than they may be told."""
     return tuple(
         f"Nothing would remain if {_WORDS[name].lower()} were off what is told by {_off(fitted, name)}, "
         f"{_more_than(name)}: check it."
-        for name in SETTINGS
+        for name in names
         if not _is_plausible(fitted, name)
     )
 
@@ -138,12 +144,18 @@ def _more_than(name: str) -> str:
 
 
 def _off(fitted: Fit, name: str) -> str:
-    off = 100.0 * np.expm1(getattr(fitted.shot_parameters, name))
+    off = 100.0 * np.expm1(_of_open(fitted, name))
     return f"{off.mean():+.2f} % in the mean, {off.std():.2f} % from shot to shot"
 
 
+def _of_open(fitted: Fit, name: str) -> Samples:
+    """Values of the shots that are open, which a fit has moved; one 0 where there are none."""
+    values: Samples = getattr(fitted.shot_parameters, name)
+    return values[values != 0.0] if values.any() else values[:1]
+
+
 def _is_plausible(fitted: Fit, name: str) -> bool:
-    deviation = getattr(fitted.shot_parameters, name)
+    deviation = _of_open(fitted, name)
     return math.sqrt(float(np.mean(deviation**2))) < PLAUSIBLE_STD * STD_OF_TOLD[name]
 
 
@@ -170,4 +182,4 @@ def _chance(own: Samples, beside: Sequence[Samples], degrees_of_freedom: int) ->
         r = min(abs(float(row @ own)) / size, 1.0 - 1e-12)
         t = r * math.sqrt((degrees_of_freedom - 1) / (1.0 - r * r))
         chances.append(2.0 * float(stats.t.sf(t, degrees_of_freedom - 1)))
-    return min(1.0, len(chances) * min(chances, default=1.0))
+    return min(1.0, len(chances) * min(chances)) if chances else 1.0

@@ -171,7 +171,7 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
         "nominal_effects": [phrase(item) for item in result.nominal.effects],
         "floor": result.floor,
         "replicates": result.replicates,
-        "own": result.problem.shot_parameter_names,
+        "own": result.held_problem.shot_parameter_names,
         "spread": result.final.spread,
         "proposals": result.experiments,
         "alpha": ALPHA,

@@ -1,7 +1,8 @@
 """Open-loop simulation of held-out shots: what an engineer means by the error of a model.
 
 Friction is that of the model, not the shot's own; only the state in which a shot begins is fitted, where the
-record does not begin at rest.
+record does not begin at rest. Velocity and mass are as told, or off that by what they are in the mean of the
+training shots.
 """
 
 import math
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.discrepancy.data import CHANNELS, FORCE, POSITION
-from impactcell.discrepancy.model import Fit, Problem, simulate_open_loop
+from impactcell.discrepancy.model import Fit, Problem, settings_on_average, simulate_open_loop
 from impactcell.records import Samples
 
 UNITS = ("N", "m", "m")
@@ -58,7 +59,7 @@ def simulate_held_out(problem: Problem, before: Fit, after: Fit) -> Simulation:
 
 
 def _error(problem: Problem, model: Fit, channel: int) -> SimulationError:
-    missed = simulate_open_loop(problem, model)
+    missed = simulate_open_loop(settings_on_average(problem, model), model)
     shots = problem.shots
     inside, force = shots.channel == channel, shots.channel == FORCE
     variation = np.concatenate([_about_mean(shots.values[part][inside[part]]) for part in _parts(problem)])
