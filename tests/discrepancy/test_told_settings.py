@@ -97,7 +97,7 @@ def test_an_effect_is_named_beside_scatter(tmp_path: Path) -> None:
 
 
 def test_a_velocity_that_is_wrong_alike_in_all_shots_is_no_gap() -> None:
-    found, _ = found_in(JOB, velocity_error=-0.005)
+    found, _ = found_in(replace(JOB, shots=20), velocity_error=-0.005)
     assert (found.verdict, found.added) == ("no_gap", ())
     mean, scatter = said_of(found)["Velocity"]
     assert mean == pytest.approx(-0.5, abs=0.03)
@@ -105,7 +105,7 @@ def test_a_velocity_that_is_wrong_alike_in_all_shots_is_no_gap() -> None:
 
 
 def test_a_velocity_farther_off_than_it_may_be_told_is_a_gap_and_is_said() -> None:
-    found, _ = found_in(JOB, velocity_error=0.03)
+    found, _ = found_in(replace(JOB, shots=20), velocity_error=0.03)
     assert (found.verdict, found.added) == ("unknown", ())
     assert not said_of(found)
     (said,) = (one for one in found.prepared.notes if one.startswith("Nothing would remain if"))
