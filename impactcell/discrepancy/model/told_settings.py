@@ -19,8 +19,8 @@ SETTINGS = tuple(STD_OF_TOLD)
 FEWEST_TO_SEE = 6
 """Degrees of freedom of a scatter among like shots from which on it is looked at."""
 MIN_ERRORS = 5.0
-"""A scatter is seen from so many of its errors on: what a model lacks made 4.1 of them at most by itself, but
-for static friction that goes with dwell, an effect that acts between shots."""
+"""A scatter is seen from so many of its errors on: what a model lacks made 4.6 of them at most by itself, but
+for static friction that goes with dwell, an effect that acts between shots; correlated noise made 6."""
 CHANCE = 1e-3
 """A scatter that goes with something else of the shots by less than this chance is not of the setting."""
 PLAUSIBLE_STD = 3.0
