@@ -73,11 +73,6 @@ class NominalModel:
         prepared = replace(self.prepared, shots=with_open_settings(self.prepared.shots, names))
         return self._reopened(prepared, tuple(names))
 
-    @property
-    def open_settings(self) -> tuple[str, ...]:
-        """Settings that are open, of those that are told at all."""
-        return tuple(name for name in self.opened if name in self.problem.shot_parameter_names)
-
     def _reopened(self, prepared: PreparedCampaign, opened: tuple[str, ...]) -> "NominalModel":
         problem = problem_of(prepared, self.floor, self.training)
         return NominalModel(prepared, self.floor, self.training, problem, fit_from(problem, self.fit), opened)
@@ -85,7 +80,8 @@ class NominalModel:
     def notes(self, final: Fit) -> tuple[str, ...]:
         """Say what the shots have of their own that records had told, by the model left in the end."""
         contact = (contact_note(final),) if ONSET in self.opened else ()
-        return (*contact, *setting_notes(final, [name for name in self.open_settings if name != ONSET]))
+        told = set(self.problem.shot_parameter_names) - {ONSET}
+        return (*contact, *setting_notes(final, [name for name in self.opened if name in told]))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -69,8 +69,8 @@ def find_basis(context: SearchContext, nominals: NominalModels, search: Search) 
     if opened:
         nominals = nominals.with_settings(opened)
     basis = _beside(context, nominals, nominals.start, search)
-    while seen := _scattered(basis):
-        nominals = nominals.with_settings(seen)
+    while further := _opened_further(basis):
+        nominals = further
         basis = _beside(context, nominals, nominals.start, search)
     if basis.explains:
         return basis
@@ -109,22 +109,22 @@ def _scattered_at_first(context: SearchContext, nominals: NominalModels) -> tupl
     return tuple(seen)
 
 
-def _scattered(basis: Basis) -> tuple[str, ...]:
-    """Name the settings that are open and those that scatter among like shots, if there are more.
+def _opened_further(basis: Basis) -> NominalModels | None:
+    """Open the settings that scatter among like shots where something remains, if there are more.
 
     One that scatters much hides another: what is seen is open before the next look.
     """
     if basis.explains:
-        return ()
-    already = basis.nominals.exact.opened
-    opened, problem, best = already, basis.nominal.problem, basis.best
+        return None
+    nominals: NominalModels | None = None
+    opened, problem, best = basis.nominals.exact.opened, basis.nominal.problem, basis.best
     while more := [
         name for name, one in setting_scatter(problem, best).items() if one.is_seen and name not in opened
     ]:
         opened = (*opened, *more)
-        start = basis.nominals.with_settings(opened).start
-        problem, best = start.problem, start.fit
-    return opened if opened != already else ()
+        nominals = basis.nominals.with_settings(opened)
+        problem, best = nominals.start.problem, nominals.start.fit
+    return nominals
 
 
 def _others(nominals: NominalModels, search: Search) -> Iterator[tuple[NominalModel, Search]]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from impactcell.discrepancy.data import IndexArray
 from impactcell.discrepancy.model.problem import FitState, Problem, total_cost
-from impactcell.discrepancy.model.shot_parameters import STD_OF_TOLD, ShotParameters
+from impactcell.discrepancy.model.shot_parameters import ShotParameters, known_std
 from impactcell.records import Samples
 
 THOROUGH_STEPS = 8
@@ -166,13 +166,13 @@ def normal_equations(
 
 def _weights(problem: Problem, spread: float) -> Samples:
     """One over the variance of what every shot has of its own, shape (q,); 0 where nothing is known of it."""
-    std = {"log_factor": spread, **STD_OF_TOLD}
+    std = known_std(spread)
     return np.array([1.0 / std[name] ** 2 if name in std else 0.0 for name in problem.shot_parameter_names])
 
 
 def _pull(problem: Problem, state: FitState) -> Samples:
     """Half the gradient, shape (n, q), of what it costs the shots to be far from what is known of them."""
-    std = {"log_factor": state.spread, **STD_OF_TOLD}
+    std = known_std(state.spread)
     pull = np.zeros((problem.count, len(problem.shot_parameter_names)))
     for column, name in enumerate(problem.shot_parameter_names):
         if name in std:

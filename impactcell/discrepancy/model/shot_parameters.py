@@ -39,11 +39,8 @@ class ShotParameters:
 
     def cost(self, spread: float) -> Samples:
         """Squared deviations, shape (n,), of the factors by their spread, of what is told by its error."""
-        told: Samples = sum(
-            ((getattr(self, name) / std) ** 2 for name, std in STD_OF_TOLD.items()),
-            (self.log_factor / spread) ** 2,
-        )
-        return told
+        cost: Samples = sum((getattr(self, name) / std) ** 2 for name, std in known_std(spread).items())
+        return cost
 
     def select(self, places: IndexArray) -> "ShotParameters":
         """Return the numbers of some of the shots."""
@@ -55,3 +52,8 @@ class ShotParameters:
         for name, values in values_by_name.items():
             values[places] = getattr(replacement, name)
         return ShotParameters(**values_by_name)
+
+
+def known_std(spread: float) -> dict[str, float]:
+    """Give the standard deviations of what is known of every shot's own numbers, by name."""
+    return {"log_factor": spread, **STD_OF_TOLD}
