@@ -21,7 +21,7 @@ from impactcell.positioning import (
 )
 from impactcell.serialization import Migration
 from impactcell.serialization.tree import Tree
-from impactcell.tracking.wear_batch import block_filter
+from impactcell.tracking.wear_batch import block_filter, run_length_bank
 
 ALARM_NAMES_1: Final[Mapping[str, str]] = {
     "WEAR_LIMIT": "WearLimit",
@@ -261,7 +261,8 @@ STATE_MIGRATIONS: Final = (
             "cell.tracker.replayed_noise.rescalings": 0.0,
         },
     ),
+    Migration(added={"cell.tracker.rates": run_length_bank.EMPTY, "cell.tracker.rate_change": None}),
 )
-"""Of a cell's state: to format 2, 3, 4, 5, 6 and 7. What earlier planners had not counted is nothing."""
+"""Of a cell's state: to format 2, 3, 4, 5, 6, 7 and 8. What earlier planners had not counted is nothing."""
 ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)
 MODEL_MIGRATIONS: Final = (Migration(_model_2, renamed=_MODEL_2_RENAMED),)

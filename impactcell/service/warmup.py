@@ -28,6 +28,8 @@ SERIES = 800
 """Estimates of friction that the tracker is given beside the first real cycles, ..."""
 CHANGES = {60: 0.05, 300: 0.012, 500: -0.03}
 """... and cycles of it from which on they are higher by so much, ..."""
+WEAR, RUN_IN = 1e-4, 400
+"""... wear a cycle, and the cycle at which it ends, ..."""
 ANNOUNCED, OUTLIER = 300, 30
 """... one of which begins another batch, said to be one; and a cycle that is an outlier."""
 
@@ -68,7 +70,9 @@ def _run_series(settings: TrackerSettings, stop: Callable[[], bool]) -> bool:
         if stop():
             return False
         change = sum(size for begin, size in CHANGES.items() if cycle >= begin)
-        mu_s = 0.2 + 1e-5 * cycle + change + 0.05 * (cycle == OUTLIER) + random.normal(0.0, 0.002)
+        mu_s = (
+            0.2 + WEAR * min(cycle, RUN_IN) + change + 0.05 * (cycle == OUTLIER) + random.normal(0.0, 0.002)
+        )
         batch = "second" if cycle >= ANNOUNCED else "first"
         estimate = FrictionObservation(cycle, mu_s, 0.002, cycle * 10**9, batch)
         state = wear_batch.update(settings, state, estimate).state

@@ -43,10 +43,10 @@ def detect_change(
     is_known = settings.batch is BatchKnowledge.KNOWN and cycle.observation.batch_id is not None
     ways = WAYS_KNOWN if is_known else 1.0
     threshold = run_length_bank.threshold(ways * settings.false_alarm_cycles)
-    statistic = _student_statistic(updated.statistic, cycle.noise)
-    is_quiet = cycle.announced < 0.0 or cycle.timing.lag > 0 or statistic <= threshold
-    if is_quiet or not _scale_is_known(state, cycle.noise):
+    is_quiet = cycle.announced < 0.0 or cycle.timing.lag > 0
+    if is_quiet or not is_certain(state, cycle.noise, updated.statistic, threshold):
         return state, None
+    statistic = _student_statistic(updated.statistic, cycle.noise)
     first, size, std = run_length_bank.locate_change_point(updated.bank, state.accepted, index)
     change = ChangePoint(first, size, std, index, statistic, threshold)
     return replace(state, accepted_before=state.accepted, accepted=index, change_point=change), change
@@ -56,6 +56,8 @@ def refined_change_point(state: TrackerState, bank: Samples) -> ChangePoint | No
     """Let the cycles since say more of the bank's last change: when it was and how large."""
     change = state.change_point
     if change is None or change.detected_at != state.accepted:
+        return change
+    if state.rate_change is not None and state.rate_change.detected_at > change.detected_at:
         return change
     located = run_length_bank.locate_change_point(bank, state.accepted_before, state.accepted)
     return ChangePoint(*located, change.detected_at, change.statistic, change.threshold)
@@ -92,6 +94,11 @@ def reason_not_ready(state: TrackerState) -> str:
     if _scale_is_known(state, state.noise):
         return ""
     return "no change of batch is reported yet: the scale of the noise is still being learned"
+
+
+def is_certain(state: TrackerState, noise: NoiseScale, statistic: float, threshold: float) -> bool:
+    """Whether a log statistic is beyond its threshold however well the scale of the noise is known."""
+    return _student_statistic(statistic, noise) > threshold and _scale_is_known(state, noise)
 
 
 def _student_statistic(statistic: float, noise: NoiseScale) -> float:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.records import Samples
-from impactcell.tracking.wear_batch import noise_scale, run_length_bank, wear_blocks
+from impactcell.tracking.wear_batch import noise_scale, rate_changes, run_length_bank, wear_blocks
 from impactcell.tracking.wear_batch.block_filter import BlockModel
 from impactcell.tracking.wear_batch.run_length_model import (
     OFFSET,
@@ -37,15 +37,22 @@ class BankUpdate:
     bank : ndarray, shape (k, 22)
     outliers : tuple of float
         See `TrackerState`.
-    statistic : float
-        Of a change since the last one that was reported.
+    rates : ndarray, shape (m, 22)
+        See `TrackerState`.
+    statistic, rate_statistic : float
+        Of another batch, and of another rate, since the last change that was reported.
+    batch_over_rate : float
+        Of another batch against another rate alone.
     outlier_share : float
         Probability that the cycle's estimate is an outlier.
     """
 
     bank: Samples
     outliers: tuple[float, float]
+    rates: Samples
     statistic: float
+    rate_statistic: float
+    batch_over_rate: float
     outlier_share: float
 
 
@@ -78,13 +85,27 @@ def update_bank(settings: TrackerSettings, state: TrackerState, cycle: UsableCyc
     """Take a cycle into the bank."""
     bank = run_length_bank.workspace(state.bank)
     model, measurement = bank_model(settings, state, cycle), bank_measurement(cycle)
-    outliers = np.array(state.outliers)
-    result = run_length_bank.update(
-        bank, len(state.bank), model, measurement, outliers, float(state.accepted)
+    outliers, accepted = np.array(state.outliers), float(state.accepted)
+    probability = run_length_bank.outlier_probability(model.outlier_probability, *state.outliers)
+    count, log_density, outlier_share = run_length_bank.take(
+        bank, len(state.bank), model, measurement, outliers, accepted
     )
-    counts = float(outliers[0]), float(outliers[1])
-    stored = run_length_bank.stored(bank, result.hypotheses)
-    return BankUpdate(stored, counts, result.statistic, result.outlier_share)
+    since = run_length_bank.settled_until(measurement, accepted)
+    begun = float(state.first_index if state.rate_change is None else state.rate_change.detected_at)
+    in_bank = rate_changes.BankOutcome(probability, log_density, since, begun)
+    rates, before = (
+        run_length_bank.workspace(state.rates, rate_changes.ROWS),
+        run_length_bank.records(state.bank),
+    )
+    found = rate_changes.take(rates, len(state.rates), before, model, measurement, in_bank)
+    weighed = rate_changes.statistics(bank[:count], rates[:found], model, measurement, accepted)
+    return BankUpdate(
+        run_length_bank.stored(bank, count),
+        (float(outliers[0]), float(outliers[1])),
+        run_length_bank.stored(rates, found),
+        *weighed,
+        outlier_share,
+    )
 
 
 def update_blocks(

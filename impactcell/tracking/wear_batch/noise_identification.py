@@ -14,9 +14,9 @@ import numpy as np
 
 from impactcell.numerics.scatter_correlation import variance_over_scatter
 from impactcell.records import Samples
-from impactcell.tracking.wear_batch import noise_scale, run_length_bank, wear_filter
+from impactcell.tracking.wear_batch import noise_scale, rate_changes, run_length_bank, wear_filter
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale
-from impactcell.tracking.wear_batch.run_length_model import BankModel
+from impactcell.tracking.wear_batch.run_length_model import Bank, BankModel
 from impactcell.tracking.wear_batch.settings import TrackerSettings
 
 if TYPE_CHECKING:
@@ -67,11 +67,11 @@ class RandomWalks(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BankReplay:
-    """The bank after the record, outliers among how many estimates, and the record's log likelihood."""
+    """The bank after the record, other rates beside it, and outliers among how many estimates."""
 
     bank: Samples
+    rates: Samples
     outliers: tuple[float, float]
-    log_likelihood: float
 
 
 def append_cycle(record: CommissioningRecord, cycle: "UsableCycle", batch: str | None) -> CommissioningRecord:
@@ -85,13 +85,53 @@ def append_cycle(record: CommissioningRecord, cycle: "UsableCycle", batch: str |
 
 
 def replay_bank(
-    settings: TrackerSettings, record: CommissioningRecord, noise: NoiseScale, walks: RandomWalks
+    settings: TrackerSettings,
+    record: CommissioningRecord,
+    noise: NoiseScale,
+    walks: RandomWalks,
+    accepted: int,
 ) -> BankReplay:
-    """Run the bank over the record with what is known of the noise by now."""
+    """Run the bank over the record with what is known of the noise by now.
+
+    `accepted` is the last cycle at which a change of batch was reported.
+    """
+    begun = _begin(settings, record, noise, walks)
+    rates = run_length_bank.workspace(run_length_bank.EMPTY, rate_changes.ROWS)
+    outliers = np.zeros(2)
+    count, found = rate_changes.replay(
+        begun.bank, begun.hypotheses, rates, begun.model, begun.series, outliers, float(accepted)
+    )
+    stored, counts = run_length_bank.stored, (float(outliers[0]), float(outliers[1]))
+    return BankReplay(stored(begun.bank, count), stored(rates, found), counts)
+
+
+def _log_likelihood(
+    settings: TrackerSettings, record: CommissioningRecord, noise: NoiseScale, walks: RandomWalks
+) -> float:
+    """Log likelihood of the record under random walks."""
+    begun = _begin(settings, record, noise, walks)
+    accepted = float(record.rows[0, INDEX])
+    _, likelihood = run_length_bank.update_series(
+        begun.bank, begun.hypotheses, begun.model, begun.series, np.zeros(2), accepted
+    )
+    return likelihood
+
+
+class _Begun(NamedTuple):
+    """A bank at the first cycle of a record, and all of them, columns as the fields of `Measurement`."""
+
+    bank: Bank
+    hypotheses: int
+    model: BankModel
+    series: Samples
+
+
+def _begin(
+    settings: TrackerSettings, record: CommissioningRecord, noise: NoiseScale, walks: RandomWalks
+) -> _Begun:
     rows = record.rows
     variance = noise_scale.variances(noise, rows[:, STD])
     unit = float(np.median(variance))
-    # columns as the fields of `Measurement`
     passed = np.append(0.0, np.diff(rows[:, INDEX]))
     in_time = np.zeros(len(rows))
     series = np.column_stack(
@@ -101,7 +141,6 @@ def replay_bank(
     first = run_length_bank.initial_bank(
         rows[0, VALUE], variance[0], slope_std, int(rows[0, INDEX]), settings.outlier_probability
     )
-    bank = run_length_bank.workspace(first)
     model = BankModel(
         hazard=settings.hazard,
         step_variance=settings.step_std**2 * unit,
@@ -110,11 +149,7 @@ def replay_bank(
         outlier_probability=settings.outlier_probability,
         slope_prior=slope_std**2,
     )
-    outliers = np.zeros(2)
-    accepted = float(rows[0, INDEX])
-    count, likelihood = run_length_bank.update_series(bank, len(first), model, series, outliers, accepted)
-    counts = float(outliers[0]), float(outliers[1])
-    return BankReplay(run_length_bank.stored(bank, count), counts, likelihood)
+    return _Begun(run_length_bank.workspace(first), len(first), model, series)
 
 
 def identify_random_walks(
@@ -124,7 +159,7 @@ def identify_random_walks(
 
     @cache
     def likelihood(walks: RandomWalks) -> float:
-        return replay_bank(settings, record, noise, walks).log_likelihood
+        return _log_likelihood(settings, record, noise, walks)
 
     clearly = CLEARLY * variance_over_scatter(noise.variogram.correlation)
     best = RandomWalks(settings.level_noise, settings.slope_noise)

@@ -1,6 +1,9 @@
 """The tracker's process noise: commissioned from the first cycles, later the walk that explains them best."""
 
+import math
 from dataclasses import replace
+
+import numpy as np
 
 from impactcell.tracking.wear_batch import (
     batch_change_detection,
@@ -57,12 +60,20 @@ def compare_models(
     model = batch_filter.bank_model(settings, state, cycle)
     taken, statistic = walk_models.take_in(models, model, state.accepted, log_odds)
     models = walk_models.believing(taken, log_odds, cycle.noise.variogram.correlation)
-    updated = replace(updated, statistic=statistic)
+    updated = replace(updated, statistic=-float(np.logaddexp(-statistic, -updated.batch_over_rate)))
     place = models.believed
     if place == taken.believed:
         return replace(state, walk_models=models), cycle, updated, []
     seen, cycles = models.outliers[place].tolist()
-    updated = replace(updated, bank=models.banks[place], outliers=(seen, cycles))
+    # what was weighed by what is no longer believed is weighed anew with the next cycle
+    updated = replace(
+        updated,
+        bank=models.banks[place],
+        rates=run_length_bank.EMPTY,
+        outliers=(seen, cycles),
+        statistic=-math.inf,
+        rate_statistic=-math.inf,
+    )
     level, slope, scatter = models.variances[place].tolist()
     if scatter > 1.0:
         noise = noise_scale.rescaled(cycle.noise, scatter)
@@ -90,13 +101,14 @@ def _replayed(
     level, slope = walks.level**2 * unit, walks.slope**2 * unit
     if level == state.level_variance and slope == state.slope_variance and not is_rescaled:
         return state
-    again = noise_identification.replay_bank(settings, record, state.noise, walks)
+    again = noise_identification.replay_bank(settings, record, state.noise, walks, state.accepted)
     known = state.filter
     if known is not None:
         known = noise_identification.replay_filter(settings, record, state.noise, walks)
     return replace(
         state,
         bank=again.bank,
+        rates=again.rates,
         change_point=batch_change_detection.refined_change_point(state, again.bank),
         outliers=again.outliers,
         filter=known,

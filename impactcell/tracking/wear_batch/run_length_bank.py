@@ -37,6 +37,8 @@ WIDTH = HYPOTHESIS.itemsize // 8
 """Numbers of one hypothesis."""
 ROWS = CAPACITY + len(STEPS) + 1
 """Hypotheses that there can be within a cycle, before the bank is pruned."""
+EMPTY = np.zeros((0, WIDTH))
+"""No hypothesis."""
 CALIBRATION = 0.60
 """What the overshoot over the threshold, and `WINDOW`, take off it; nats, measured without outliers."""
 WINDOW = 1000.0
@@ -112,7 +114,7 @@ def take(
     density, outlier_share = run_length_update.update(bank, count, measurement, probability)
     kept = 1.0 - 1.0 / MEMORY
     outliers[0], outliers[1] = kept * outliers[0] + outlier_share, kept * outliers[1] + 1.0
-    count = run_length_update.prune(bank, count, measurement.cycle + measurement.lag, accepted)
+    count = run_length_update.prune(bank, count, measurement.cycle + measurement.lag, accepted, CAPACITY)
     return count, density, outlier_share
 
 
@@ -128,11 +130,17 @@ def update(
 
 
 @compiled
+def settled_until(measurement: Measurement, accepted: float) -> float:
+    """Cycle up to which changes are no longer reported: the last that was, or what is too long ago."""
+    return max(accepted, measurement.cycle + measurement.lag - WINDOW)
+
+
+@compiled
 def change_weights(
     bank: Bank, count: int, model: BankModel, measurement: Measurement, accepted: float
 ) -> tuple[float, float]:
     """Log weights of a change since the last that was accepted, and of none, after a measurement."""
-    since = max(accepted, measurement.cycle + measurement.lag - WINDOW)
+    since = settled_until(measurement, accepted)
     return run_length_update.change_weights(bank, count, since, model.slope_prior)
 
 
@@ -149,11 +157,11 @@ def update_series(
     return count, total
 
 
-def workspace(rows: Samples) -> Bank:
-    """Give the hypotheses of a stored bank, shape (k, 22), with room for more, shape (ROWS,)."""
-    table = np.empty((ROWS, WIDTH))  # copied as floats: numpy copies records field by field
+def workspace(rows: Samples, room: int = ROWS) -> Bank:
+    """Give the hypotheses of a stored bank, shape (k, 22), with room for more, shape (room,)."""
+    table = np.empty((room, WIDTH))  # copied as floats: numpy copies records field by field
     table[: len(rows)] = rows
-    return _records(table)
+    return records(table)
 
 
 def stored(bank: Bank, count: int) -> Samples:
@@ -179,13 +187,13 @@ def initial_bank(value: float, variance: float, slope_std: float, cycle: int, ou
 def moments(rows: Samples) -> tuple[Samples, Samples]:
     """Mean, shape (4,), and covariance, shape (4, 4), of the whole mixture."""
     mixture = np.empty(1, HYPOTHESIS)
-    run_length_update.merge(_records(rows), 0, len(rows), mixture)
+    run_length_update.merge(records(rows), 0, len(rows), mixture)
     return mixture["mean"][0], mixture["covariance"][0]
 
 
 def wear_moments(rows: Samples) -> BankMoments:
     """Of `moments`, those that tell of wear and batch, without the arrays."""
-    return run_length_update.wear_moments(_records(rows))
+    return run_length_update.wear_moments(records(rows))
 
 
 def threshold(false_alarm_cycles: float) -> float:
@@ -199,9 +207,10 @@ def threshold(false_alarm_cycles: float) -> float:
 
 def locate_change_point(rows: Samples, after: float, until: float) -> tuple[int, float, float]:
     """Most probable first cycle of the change in (after, until], its size and standard deviation."""
-    cycle, size, variance = run_length_update.change_within(_records(rows), float(after), float(until))
+    cycle, size, variance = run_length_update.change_within(records(rows), float(after), float(until))
     return int(cycle), size, math.sqrt(max(variance, 0.0))
 
 
-def _records(rows: Samples) -> Bank:
+def records(rows: Samples) -> Bank:
+    """Give the hypotheses of a stored bank, shape (k,), on the same numbers."""
     return np.ndarray(len(rows), HYPOTHESIS, rows)

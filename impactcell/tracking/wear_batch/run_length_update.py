@@ -222,8 +222,8 @@ def update(bank: Bank, count: int, measurement: Measurement, outliers: float) ->
 
 
 @compiled
-def prune(bank: Bank, count: int, cycle: float, accepted: float) -> int:
-    """Drop hopeless hypotheses, then merge neighbours, until `CAPACITY` are left.
+def prune(bank: Bank, count: int, cycle: float, accepted: float, capacity: int) -> int:
+    """Drop hopeless hypotheses, then merge neighbours, until `capacity` are left.
 
     The two merged are those closest together for their age, so that change cycles stay resolved to
     a fixed fraction of how long ago they are. Those on the two sides of `accepted` are never merged.
@@ -238,7 +238,7 @@ def prune(bank: Bank, count: int, cycle: float, accepted: float) -> int:
                 bank[kept] = bank[i]
             kept += 1
     merged = np.empty(1, bank.dtype)
-    while kept > CAPACITY:
+    while kept > capacity:
         closest, least = 0, np.inf
         for i in range(kept - 1):
             older, newer = bank[i].change_cycle, bank[i + 1].change_cycle
@@ -275,13 +275,20 @@ def slope_evidence(mean: float, variance: float, prior: float) -> float:
 
 
 @compiled
+def weight_by_slopes(bank: Bank, first: int, last: int, slope_prior: float) -> float:
+    """Log weight of hypotheses first..last-1 together when the slope's prior is the mixture over `SLOPES`."""
+    weighted = np.empty(last - first, bank.dtype)
+    for i in range(first, last):
+        evidence = slope_evidence(bank[i].mean[SLOPE], bank[i].covariance[SLOPE, SLOPE], slope_prior)
+        weighted[i - first].log_weight = bank[i].log_weight + evidence
+    return log_sum_exp(weighted, 0, last - first)
+
+
+@compiled
 def change_weights(bank: Bank, count: int, since: float, slope_prior: float) -> tuple[float, float]:
     """Log weights of all that say a change came after `since`, and of all that say none did."""
     split = 0
     while split < count and bank[split].change_cycle <= since:
         split += 1
-    weighted = np.empty(count, bank.dtype)
-    for i in range(count):
-        evidence = slope_evidence(bank[i].mean[SLOPE], bank[i].covariance[SLOPE, SLOPE], slope_prior)
-        weighted[i].log_weight = bank[i].log_weight + evidence
-    return log_sum_exp(weighted, split, count), log_sum_exp(weighted, 0, split)
+    changed = weight_by_slopes(bank, split, count, slope_prior)
+    return changed, weight_by_slopes(bank, 0, split, slope_prior)

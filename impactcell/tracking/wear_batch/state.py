@@ -3,8 +3,6 @@
 import math
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from impactcell.records import (
     BatchState,
     Capture,
@@ -17,7 +15,7 @@ from impactcell.records import (
 from impactcell.tracking.wear_batch.input_validation import CycleClock, CycleTiming
 from impactcell.tracking.wear_batch.noise_identification import CommissioningRecord
 from impactcell.tracking.wear_batch.noise_scale import NoiseScale
-from impactcell.tracking.wear_batch.run_length_bank import WIDTH
+from impactcell.tracking.wear_batch.run_length_bank import EMPTY
 from impactcell.tracking.wear_batch.walk_models import WalkModels
 from impactcell.tracking.wear_batch.wear_blocks import WearBlocks
 from impactcell.tracking.wear_batch.wear_filter import WearFilter
@@ -108,6 +106,22 @@ class ChangePoint:
     threshold: float = math.nan
 
 
+@dataclass(frozen=True, slots=True)
+class RateChange:
+    """The last change of the wear rate: index of its first cycle, mu_s a cycle before and after it.
+
+    Attributes
+    ----------
+    detected_at : int
+        Index of the cycle at which it was certain enough.
+    """
+
+    cycle: int
+    before: float
+    after: float
+    detected_at: int
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackerState:
     """All that is kept between cycles; `impactcell.serialization` writes it bit for bit.
@@ -120,6 +134,8 @@ class TrackerState:
         The filter that believes the PLC's batch ids.
     bank : ndarray, shape (k, 22)
         Run-length hypotheses, see `impactcell.tracking.wear_batch.run_length_bank`.
+    rates : ndarray, shape (m, 22)
+        Hypotheses of another wear rate, see `impactcell.tracking.wear_batch.rate_changes`.
     outliers : tuple of float
         Outliers among the bank's estimates, and how many estimates, both fading.
     accepted, accepted_before : int
@@ -139,7 +155,8 @@ class TrackerState:
     clock: CycleClock = field(default_factory=CycleClock)
     noise: NoiseScale = field(default_factory=NoiseScale)
     filter: WearFilter | None = None
-    bank: Samples = field(default_factory=lambda: np.zeros((0, WIDTH)))
+    bank: Samples = field(default_factory=lambda: EMPTY)
+    rates: Samples = field(default_factory=lambda: EMPTY)
     outliers: tuple[float, float] = (0.0, 0.0)
     accepted: int = 0
     accepted_before: int = 0
@@ -149,6 +166,7 @@ class TrackerState:
     batch_count: int = 0
     tested: bool = True
     change_point: ChangePoint | None = None
+    rate_change: RateChange | None = None
     first_index: int = 0
     replayed_noise: NoiseScale = field(default_factory=NoiseScale)
     commissioning: CommissioningRecord | None = None

@@ -3,10 +3,13 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from impactcell.records import BatchState, Evidence, Quality, Samples, WearState
 from impactcell.tracking.wear_batch import (
     batch_change_detection,
     noise_scale,
+    rate_changes,
     run_length_bank,
     wear_blocks,
     wear_filter,
@@ -75,9 +78,11 @@ def tracking_result(
     ):
         moments, offset, offset_std = _filter_moments(state.filter)
     else:
-        moments, offset, offset_std = _bank_moments(state.bank)
         blocks, index = state.wear_blocks, state.clock.last
-        if blocks is not None and len(blocks.slopes):
+        is_bent = rate_changes.has_rate_changed(state.bank, state.rates, _slope_prior(settings, state))
+        bank = np.vstack([state.bank, state.rates]) if is_bent else state.bank
+        moments, offset, offset_std = _bank_moments(bank)
+        if blocks is not None and len(blocks.slopes) and not is_bent:
             total = moments.level + offset
             moments = wear_blocks.moments(blocks, index)
             offset = total - moments.level
@@ -124,9 +129,14 @@ def _at_horizon(settings: TrackerSettings, state: TrackerState, moments: WearMom
         return math.nan, math.nan
     walks = state.level_variance, state.slope_variance
     ahead = wear_report.extrapolation(moments, walks, settings.wear_limit)
-    prior = settings.slope_std**2 * noise_scale.usual_variance(state.noise)
+    prior = _slope_prior(settings, state)
     horizon = min(settings.horizon_cycles, float(state.clock.last - state.first_index))
     return horizon, wear_report.probability_after(ahead, horizon, prior)
+
+
+def _slope_prior(settings: TrackerSettings, state: TrackerState) -> float:
+    """Prior variance of the slope."""
+    return settings.slope_std**2 * noise_scale.usual_variance(state.noise)
 
 
 def _filter_moments(known: wear_filter.WearFilter) -> tuple[WearMoments, float, float]:

@@ -10,6 +10,7 @@ from impactcell.tracking.wear_batch import (
     noise_identification,
     noise_scale,
     process_noise,
+    rate_change_detection,
     run_length_bank,
     wear_blocks,
     wear_filter,
@@ -90,6 +91,8 @@ def update(
     if state.commissioning is None and timing.lag == 0:
         state, cycle, updated, raised = process_noise.compare_models(settings, state, cycle, updated)
         notes.extend(raised)
+    state, updated, raised = rate_change_detection.detect_rate_change(settings, state, cycle, updated)
+    notes.extend(raised)
     before, change = batch_change_detection.detect_change(settings, state, cycle, updated)
     state, known, change, innovation = _update_filter(settings, before, cycle, updated, change)
     state = replace(
@@ -98,6 +101,7 @@ def update(
         noise=cycle.noise,
         filter=known,
         bank=updated.bank,
+        rates=updated.rates if change is None else updated.rates[:0],
         outliers=updated.outliers,
         change_point=batch_change_detection.refined_change_point(state, updated.bank),
         wear_blocks=batch_filter.update_blocks(settings, state, cycle, updated),
@@ -191,7 +195,8 @@ def _update_filter(
         change, has_changed = None, True
     else:
         has_changed = change is not None
-    if is_known and current is not None and not has_changed and not is_in_bank_only:
+    is_bent = state.rate_change is not None and state.rate_change.detected_at == timing.index
+    if is_known and current is not None and not (has_changed or is_bent or is_in_bank_only):
         return _update_known_batch(settings, state, cycle, current)
     innovation = batch_filter.innovation(state, cycle)
     if settings.batch is BatchKnowledge.UNKNOWN:
@@ -199,13 +204,15 @@ def _update_filter(
     if batch_id is None:
         if current is not None and timing.lag == 0:
             # nobody says of which batch the cycle was: its time passes; after a change the bank knows better
-            current = _pass_time(state, current, cycle) if change is None else None
+            current = None if is_bent or change is not None else _pass_time(state, current, cycle)
     elif current is None:
         current = wear_filter.from_bank(*run_length_bank.moments(updated.bank), batch_id)
     elif has_changed:
         current = wear_filter.restart_after_change(current, *run_length_bank.moments(updated.bank))
         # what was learned of the noise from here on would be learned from a mix of two materials
         state = replace(state, tested=True, commissioning=None)
+    elif is_bent:
+        current = wear_filter.restart_at_rate(current, *run_length_bank.moments(updated.bank))
     return state, current, change, innovation
 
 

@@ -76,6 +76,16 @@ def restart_after_change(state: WearFilter, mean: Samples, covariance: Samples) 
     return WearFilter(batches, state.current, taken @ mean, taken @ covariance @ taken.T)
 
 
+def restart_at_rate(state: WearFilter, mean: Samples, covariance: Samples) -> WearFilter:
+    """Go on from the bank's state after wear has changed its rate, which level and slope lag behind.
+
+    The present batch stays what it is, offsets of batches before are given up.
+    """
+    if state.current == state.batches[0]:
+        return from_bank(mean, covariance, state.current)
+    return restart_after_change(state, mean, covariance)
+
+
 def predict(state: WearFilter, cycles: int, level_variance: float, slope_variance: float) -> WearFilter:
     """Predict over `cycles` cycles; the variances are those of the random walks, a cycle."""
     n = len(state.mean)
