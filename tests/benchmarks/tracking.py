@@ -15,6 +15,7 @@ from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker
 from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings, initial_state
 from tests.benchmarks import (
+    _bends,
     _correlated,
     _declared,
     _inside,
@@ -42,6 +43,8 @@ def tables(*, quick: bool = False) -> Iterator[Table]:
         _declared.table,
         _correlated.table,
         _other_streams.table,
+        _bends.table,
+        _bends.step_table,
         _steps.table,
         _told_steps.table,
         _signatures.speed_table,
