@@ -89,8 +89,8 @@ def table(*, quick: bool) -> Table:
             "level at the end",
         ],
         rows,
-        f"{runs} streams of {CYCLES} cycles a row, designed: {1e-5 * runs * CYCLES:.1f} false alarms. What is "
-        "taken for the batch's step is missing in the level.",
+        f"{runs} streams of {CYCLES} cycles a row, designed: {1e-5 * runs * CYCLES:.1f} false alarms. What "
+        "is taken for a step of the batch is missing in the level.",
     )
 
 

@@ -10,6 +10,7 @@ from impactcell.tracking.wear_batch.batch_filter import BankUpdate
 from impactcell.tracking.wear_batch.run_length_model import SLOPE
 from impactcell.tracking.wear_batch.settings import TrackerSettings
 from impactcell.tracking.wear_batch.state import RateChange, TrackerState, UsableCycle
+from impactcell.tracking.wear_batch.wear_report import INTERVAL_STDS
 
 
 def detect_rate_change(
@@ -30,10 +31,12 @@ def detect_rate_change(
     rates = run_length_bank.records(updated.rates)
     likeliest = rates[int(np.argmax(rates["log_weight"]))]
     before = float(run_length_bank.moments(updated.bank)[0][SLOPE])
-    change = RateChange(int(likeliest["change_cycle"]), before, float(likeliest["mean"][SLOPE]), index)
+    after, std = float(likeliest["mean"][SLOPE]), math.sqrt(likeliest["covariance"][SLOPE, SLOPE])
+    change = RateChange(int(likeliest["change_cycle"]), before, after, std, index)
+    interval = f"{1000.0 * after:.3g} ± {1000.0 * INTERVAL_STDS * std:.2g}"
     note = (
-        f"since cycle {state.clock.number(change.cycle)} mu_s goes by {1000.0 * change.after:.3g} in 1000 "
-        f"cycles, {1000.0 * before:.3g} before"
+        f"since cycle {state.clock.number(change.cycle)} mu_s goes by {interval} in 1000 cycles, "
+        f"{1000.0 * before:.3g} before"
     )
     state = replace(state, rate_change=change, wear_blocks=None, walk_models=None, commissioning=None)
     slope_prior = batch_filter.bank_model(settings, state, cycle).slope_prior

@@ -112,6 +112,8 @@ class RateChange:
 
     Attributes
     ----------
+    after_std : float
+        Standard deviation of the rate after it, when it was detected.
     detected_at : int
         Index of the cycle at which it was certain enough.
     """
@@ -119,6 +121,7 @@ class RateChange:
     cycle: int
     before: float
     after: float
+    after_std: float
     detected_at: int
 
 

@@ -62,6 +62,8 @@ def test_what_lies_outside_the_calibration_is_said_in_german() -> None:
         ("friction is found to go unsteadily from cycle to cycle, the past is seen so from here on",
          ("die Reibung ändert sich, wie sich zeigt, von Zyklus zu Zyklus unstetig; so wird die "
           "Vergangenheit von nun an gesehen")),
+        ("since cycle 188 mu_s goes by -0.00899 ± 0.0021 in 1000 cycles, 0.0133 before",
+         "seit Zyklus 188 ändert sich µs um -0,00899 ± 0,0021 in 1000 Zyklen, davor um 0,0133"),
         ("what nobody has translated; in place", "what nobody has translated; am Ziel"),
         ("", ""),
     ],

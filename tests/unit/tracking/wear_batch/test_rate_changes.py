@@ -175,7 +175,9 @@ def test_another_rate_is_found_and_told_and_no_batch_is_blamed(knowledge, before
     assert abs(change.cycle - 450) < 60
     assert change.before == pytest.approx(UNIT * before, rel=0.2)
     first, rate, was = change.cycle, 1000.0 * change.after, 1000.0 * change.before
-    assert note == f"since cycle {first} mu_s goes by {rate:.3g} in 1000 cycles, {was:.3g} before"
+    interval = f"{rate:.3g} ± {1960.0 * change.after_std:.2g}"
+    assert note == f"since cycle {first} mu_s goes by {interval} in 1000 cycles, {was:.3g} before"
+    assert abs(change.after - UNIT * after) < 4.0 * change.after_std
     assert outcomes[cycle].wear.quality is Quality.UNCERTAIN
     wear = outcomes[-1].wear
     assert abs(wear.rate_per_cycle - UNIT * after) < 3.0 * wear.rate_std
