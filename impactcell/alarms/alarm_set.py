@@ -72,8 +72,8 @@ def evaluate(settings: AlarmSettings, state: AlarmSetState, inputs: CycleInputs)
     Where its evidence leaves that open, it is as often as the cell wants it of every rule.
     """
     results = [
-        rule.evaluate(inputs, RuleContext(settings.rule(name), state.alarm(name).active))
-        for name, rule in RULES.items()
+        rule.evaluate(inputs, RuleContext(settings.rule(name), alarm.active, alarm.evidence))
+        for name, rule, alarm in ((name, rule, state.alarm(name)) for name, rule in RULES.items())
         if rule.evaluate is not None
     ]
     if math.isnan(inputs.false_alarm_cycles):

@@ -162,10 +162,11 @@ class CycleInputs:
 
 @dataclass(frozen=True, slots=True)
 class RuleContext:
-    """Settings of a rule in this cell, and whether its alarm is active."""
+    """Settings of a rule in this cell, whether its alarm is active, and what it has told last."""
 
     settings: RuleSettings
     active: bool
+    told: Evidence = NO_EVIDENCE
 
     @property
     def threshold(self) -> float:

@@ -36,29 +36,44 @@ def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
     if probability <= context.threshold:
         return RuleResult(NAME, holds=False)
     above = wear.level - wear.limit
-    since = _passed(wear, inputs.cycle, above)
+    # what has been told of when it was passed stays: the rate of now says nothing of that any more
+    since = context.told.change_cycle if context.active else _passed(wear, inputs.cycle, above)
     evidence = Evidence(probability, context.settings.activate_above, since, above, wear.level_std)
-    return RuleResult(NAME, holds=True, message=_message(wear, evidence, inputs.cycle), evidence=evidence)
+    message = _message(wear, evidence, inputs.cycle, active=context.active)
+    return RuleResult(NAME, holds=True, message=message, evidence=evidence)
+
+
+def _is_rising(wear: WearState) -> bool:
+    return wear.rate_per_cycle > TOLD_STDS * wear.rate_std
 
 
 def _passed(wear: WearState, cycle: int, above: float) -> int:
-    """Cycle at which a level that is `above` the limit now was at it."""
-    is_rising = wear.rate_per_cycle > 0.0 < above
-    return max(cycle - round(above / wear.rate_per_cycle), 0) if is_rising else cycle
+    """Cycle at which a level that is `above` the limit now was at it; this one where no rise is seen."""
+    is_past = _is_rising(wear) and above > 0.0
+    return max(cycle - round(above / wear.rate_per_cycle), 0) if is_past else cycle
 
 
-def _message(wear: WearState, evidence: Evidence, cycle: int) -> Message:
+def _message(wear: WearState, evidence: Evidence, cycle: int, *, active: bool) -> Message:
     since, reach = evidence.change_cycle, TOLD_STDS * wear.level_std
     sure, sure_in_german = percent_sure(evidence.statistic)
     doubt, doubt_in_german = DOUBT if wear.quality is Quality.UNCERTAIN else ("", "")
-    first, last = (_passed(wear, cycle, evidence.size + edge) for edge in (reach, -reach))
+    if active:
+        when, when_in_german = (
+            f"was passed at about cycle {since} (",
+            f"etwa bei Zyklus {since} überschritten (",
+        )
+    elif _is_rising(wear):
+        first, last = (_passed(wear, cycle, evidence.size + edge) for edge in (reach, -reach))
+        when = f"was passed at about cycle {since} ({first} to {last}; "
+        when_in_german = f"etwa bei Zyklus {since} überschritten ({first} bis {last}; "
+    else:
+        when, when_in_german = "is passed (", "überschritten ("
     return Message(
         f"The surface is worn: friction is {plus_minus(wear.level, wear.level_std, '.4f')} (95 %), "
-        f"its limit {wear.limit:.4f} was passed at about cycle {since} ({first} to {last}; "
-        f"{sure} % sure). {doubt}Renew the surface, then reset wear.",
+        f"its limit {wear.limit:.4f} {when}{sure} % sure). {doubt}Renew the surface, then reset wear.",
         f"Die Oberfläche ist verschlissen: Reibung {german(wear.level, '.4f', wear.level_std)} (95 %), "
-        f"Grenze {german(wear.limit, '.4f')} etwa bei Zyklus {since} überschritten ({first} bis {last}; "
-        f"{sure_in_german} % sicher). {doubt_in_german}Oberfläche erneuern, danach Verschleiß zurücksetzen.",
+        f"Grenze {german(wear.limit, '.4f')} {when_in_german}{sure_in_german} % sicher). "
+        f"{doubt_in_german}Oberfläche erneuern, danach Verschleiß zurücksetzen.",
     )
 
 

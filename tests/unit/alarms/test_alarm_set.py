@@ -208,6 +208,32 @@ def test_every_message_tells_two_standard_deviations():
     assert "at about cycle 1500 (1300 to 1700;" in judge(SETTINGS, NORMAL, at, WEAR).message.english
 
 
+def test_when_the_limit_was_passed_is_not_told_anew_by_the_rate_of_now():
+    """A surface that has run in does not rise any more: by that it was never at its limit."""
+    worn = wear(0.99)
+    state, _ = run(SETTINGS, NORMAL, WEAR, [])
+    for cycle in range(2000, 2010):
+        results = alarms.evaluate(SETTINGS, state, CycleInputs(cycle, worn))
+        state, _ = alarms.update(SETTINGS, state, results, cycle, 0)
+    told = state.alarm(WEAR)
+    assert told.active
+    assert "was passed at about cycle 1505 (1305 to 1705;" in told.message
+    for rate in (0.0, -1e-6, 5e-7):
+        flat = replace(worn, level=worn.level + 0.01, rate_per_cycle=rate, rate_std=3e-7)
+        results = alarms.evaluate(SETTINGS, state, CycleInputs(3000, flat))
+        later = alarms.update(SETTINGS, state, results, 3000, 0)[0].alarm(WEAR)
+        assert (
+            "friction is 0.2200 ± 0.0020 (95 %), its limit 0.2050 was passed at about cycle 1505 ("
+            in later.message
+        )
+        assert "Grenze 0,2050 etwa bei Zyklus 1505 überschritten (" in later.message_de
+        assert later.evidence.change_cycle == 1505
+        fresh = judge(SETTINGS, NORMAL, CycleInputs(3000, flat), WEAR)
+        assert "its limit 0.2050 is passed (" in fresh.message.english
+        assert "Grenze 0,2050 überschritten (" in fresh.message.german
+        assert fresh.evidence.change_cycle == 3000
+
+
 def test_an_announced_batch_keeps_the_batch_alarm_silent():
     settings = AlarmSettings(announced_cycles=3)
     state = alarms.initial_state(settings)
