@@ -7,6 +7,7 @@ import numpy as np
 
 from impactcell.tracking.wear_batch import batch_change_detection, batch_filter, rate_changes, run_length_bank
 from impactcell.tracking.wear_batch.batch_filter import BankUpdate
+from impactcell.tracking.wear_batch.input_validation import CycleClock
 from impactcell.tracking.wear_batch.run_length_model import SLOPE
 from impactcell.tracking.wear_batch.settings import TrackerSettings
 from impactcell.tracking.wear_batch.state import RateChange, TrackerState, UsableCycle
@@ -14,12 +15,17 @@ from impactcell.tracking.wear_batch.wear_report import INTERVAL_STDS
 
 
 def detect_rate_change(
-    settings: TrackerSettings, state: TrackerState, cycle: UsableCycle, updated: BankUpdate
+    settings: TrackerSettings, state: TrackerState, cycle: UsableCycle, updated: BankUpdate, clock: CycleClock
 ) -> tuple[TrackerState, BankUpdate, list[str]]:
     """Believe that wear goes on at another rate once a cycle, in the bank by now, makes it certain enough.
 
-    Its hypotheses go on in the bank, as such of the same batch, and what was learned of wear and of the walks
-    under the rate before is given up. Also says what is believed now.
+    Its hypotheses go on in the bank, as such of the same batch. What the cycles before said of wear, and made
+    of other walks, is given up; the walk that is believed stays. Also says what is believed now.
+
+    Parameters
+    ----------
+    clock : CycleClock
+        With this cycle in it.
     """
     threshold = run_length_bank.threshold(settings.false_alarm_cycles)
     is_quiet = cycle.announced > 0.0 or cycle.timing.lag > 0
@@ -35,7 +41,7 @@ def detect_rate_change(
     change = RateChange(int(likeliest["change_cycle"]), before, after, std, index)
     interval = f"{1000.0 * after:.3g} ± {1000.0 * INTERVAL_STDS * std:.2g}"
     note = (
-        f"since cycle {state.clock.number(change.cycle)} mu_s goes by {interval} in 1000 cycles, "
+        f"since cycle {clock.number(change.cycle)} mu_s goes by {interval} in 1000 cycles, "
         f"{1000.0 * before:.3g} before"
     )
     state = replace(state, rate_change=change, wear_blocks=None, walk_models=None, commissioning=None)

@@ -2,15 +2,16 @@
 
 A surface that runs in wears fast and then slowly; towards its end it is the other way round. To whoever knows
 steady wear and batches only, such a bend is a step of the batch. So each cycle may be the first of another
-rate: level and offset go on, the slope is drawn anew from N(0, slope²), for wear that has been seen rarely
-goes on many times as fast. These hypotheses are weighed against those of `run_length_bank` in the same way
-(Adams & MacKay 2007, arXiv:0710.3742), and are rows of the same kind; `change_cycle` is the first cycle of
-the rate. In none of them has the batch changed since the last change that was reported.
+rate: level and offset go on, the slope is drawn anew from N(0, slope² - `SEEN`² var(slope)), for wear that
+has been seen rarely goes on many times as fast. These hypotheses are weighed against `run_length_bank`'s in
+the same way (Adams & MacKay 2007, arXiv:0710.3742), and are rows of the same kind; `change_cycle` is the
+first cycle of the rate. In none of them has the batch changed since the last change that was reported.
 
 Wear that has not been seen yet has no rate that could change: a slope that may turn into any other explains
 small steps of the batch for hundreds of cycles, which would be found so much later. Nor has very slow wear:
 in the cycles in which a change of batch is looked for (`run_length_bank.WINDOW`) it bends by less than a
-standard deviation of an estimate.
+standard deviation of an estimate. Wear that becomes more than some four times as fast is beyond that prior,
+and a change of batch.
 """
 
 import math
@@ -110,9 +111,7 @@ def take(
     is_announced = measurement.announced > 0.0
     if is_announced:
         for i in range(count):
-            for a in (TOTAL, OFFSET):
-                for b in (TOTAL, OFFSET):
-                    rates[i].covariance[a, b] += model.step_variance
+            _step(rates[i : i + 1], model.step_variance)
     density, _ = run_length_update.update(rates, count, measurement, in_bank.outlier_probability)
     # after a step of unknown size a measurement says nothing of the rate
     gained = 0.0 if is_announced else density - in_bank.log_density
@@ -157,12 +156,23 @@ def _spawn(
     hazard = model.hazard * (YOUNG_HAZARD if is_young else RATE_HAZARD)
     begun.log_weight += math.log(min(hazard * measurement.cycles, 0.5))
     begun.change_cycle = measurement.cycle
-    for a in (SLOPE, SHIFT):
-        begun.mean[a] = 0.0
-        for b in range(STATES):
-            begun.covariance[a, b] = begun.covariance[b, a] = 0.0
+    begun.mean[SLOPE] = 0.0
+    for a in range(STATES):
+        begun.covariance[a, SLOPE] = begun.covariance[SLOPE, a] = 0.0
     begun.covariance[SLOPE, SLOPE] = prior
     return count + 1
+
+
+@compiled
+def _step(hypothesis: Bank, variance: float) -> None:
+    """Let a batch begin whose step is only known to have this variance; it is the last shift."""
+    mean, covariance = hypothesis[0].mean, hypothesis[0].covariance
+    mean[SHIFT] = 0.0
+    for a in range(STATES):
+        covariance[a, SHIFT] = covariance[SHIFT, a] = 0.0
+    for a in (TOTAL, OFFSET, SHIFT):
+        for b in (TOTAL, OFFSET, SHIFT):
+            covariance[a, b] += variance
 
 
 @compiled
@@ -221,7 +231,10 @@ def replay(
 
 
 def joined(rows: Samples, rates: Samples, cycle: int, accepted: int, slope_prior: float) -> Samples:
-    """Make hypotheses of another rate such of the bank, as settled as the last change of batch."""
+    """Make hypotheses of another rate such of the bank, as settled as the last change of batch.
+
+    Their weights add up to one again.
+    """
     cycles = run_length_bank.records(rows)["change_cycle"]
     split = int(np.searchsorted(cycles, accepted, side="right"))
     all_rows = np.vstack([rows[:split], rates, rows[split:]])
@@ -236,11 +249,19 @@ def joined(rows: Samples, rates: Samples, cycle: int, accepted: int, slope_prior
     count = run_length_update.prune(
         bank, len(bank), float(cycle), float(accepted), run_length_update.CAPACITY
     )
+    bank["log_weight"][:count] -= run_length_update.log_sum_exp(bank, 0, count)
     return run_length_bank.stored(bank, count)
 
 
-def has_rate_changed(bank: Samples, rates: Samples, slope_prior: float) -> bool:
-    """Whether it is likelier that wear goes on at another rate than all that the bank knows."""
-    known, others = run_length_bank.records(bank), run_length_bank.records(rates)
-    weight = run_length_update.log_sum_exp(others, 0, len(others))
-    return bool(weight > run_length_update.weight_by_slopes(known, 0, len(known), slope_prior))
+def mixture(rows: Samples, rates: Samples, slope_prior: float) -> tuple[Samples, bool]:
+    """Weigh the bank and the hypotheses of another rate alike, and say whether the latter are likelier."""
+    bank = run_length_bank.workspace(rows, len(rows))
+    for hypothesis in bank:
+        hypothesis["log_weight"] += run_length_update.slope_evidence(
+            hypothesis["mean"][SLOPE], hypothesis["covariance"][SLOPE, SLOPE], slope_prior
+        )
+    others = run_length_bank.records(rates)
+    is_likelier = run_length_update.log_sum_exp(others, 0, len(others)) > run_length_update.log_sum_exp(
+        bank, 0, len(bank)
+    )
+    return np.vstack([run_length_bank.stored(bank, len(bank)), rates]), bool(is_likelier)

@@ -149,8 +149,11 @@ class TrackerState:
         The present known batch has been reported as shifted, or was expected to be.
     replayed_noise : NoiseScale
         As it was when the first cycles were last gone over with it.
+    rate_change : RateChange or None
+        The last that was found.
     walk_models : WalkModels or None
-        How much more likely other random walks of level and slope have become; None while commissioning.
+        How much more likely other random walks of level and slope have become; None while commissioning, and
+        until the next cycle after a change of rate.
     wear_blocks : WearBlocks or None
         What all cycles say of wear where nobody says of which batch they are; None while the filter does.
     """

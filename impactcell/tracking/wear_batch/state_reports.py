@@ -3,8 +3,6 @@
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from impactcell.records import BatchState, Evidence, Quality, Samples, WearState
 from impactcell.tracking.wear_batch import (
     batch_change_detection,
@@ -79,8 +77,10 @@ def tracking_result(
         moments, offset, offset_std = _filter_moments(state.filter)
     else:
         blocks, index = state.wear_blocks, state.clock.last
-        is_bent = rate_changes.has_rate_changed(state.bank, state.rates, _slope_prior(settings, state))
-        bank = np.vstack([state.bank, state.rates]) if is_bent else state.bank
+        bank, is_bent = state.bank, False
+        if len(state.rates):
+            mixture, is_bent = rate_changes.mixture(state.bank, state.rates, _slope_prior(settings, state))
+            bank = mixture if is_bent else bank
         moments, offset, offset_std = _bank_moments(bank)
         if blocks is not None and len(blocks.slopes) and not is_bent:
             total = moments.level + offset

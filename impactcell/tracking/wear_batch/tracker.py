@@ -62,6 +62,10 @@ def update(
         if identical >= settings.identical_limit:
             notes.append(f"mu_s has been the same {identical} times in a row, not used")
             noise, is_unusable = replace(noise, identical=identical), True
+    bend = state.rate_change
+    if timing.lag > 0 and bend is not None and timing.index < bend.cycle:
+        notes.append("the cycle is from before wear changed its rate, not used")
+        is_unusable = True
     if is_unusable or timing.repeated:
         # the clock must not pass a cycle that was not taken in: its time passes with the next one
         clock = replace(clock, last=state.clock.last) if state.clock.seen else state.clock
@@ -91,17 +95,17 @@ def update(
     if state.commissioning is None and timing.lag == 0:
         state, cycle, updated, raised = process_noise.compare_models(settings, state, cycle, updated)
         notes.extend(raised)
-    state, updated, raised = rate_change_detection.detect_rate_change(settings, state, cycle, updated)
+    state, updated, raised = rate_change_detection.detect_rate_change(settings, state, cycle, updated, clock)
     notes.extend(raised)
-    before, change = batch_change_detection.detect_change(settings, state, cycle, updated)
-    state, known, change, innovation = _update_filter(settings, before, cycle, updated, change)
+    before, found = batch_change_detection.detect_change(settings, state, cycle, updated)
+    state, known, change, innovation = _update_filter(settings, before, cycle, updated, found)
     state = replace(
         state,
         clock=clock,
         noise=cycle.noise,
         filter=known,
         bank=updated.bank,
-        rates=updated.rates if change is None else updated.rates[:0],
+        rates=updated.rates if found is None else run_length_bank.EMPTY,
         outliers=updated.outliers,
         change_point=batch_change_detection.refined_change_point(state, updated.bank),
         wear_blocks=batch_filter.update_blocks(settings, state, cycle, updated),

@@ -77,13 +77,19 @@ def restart_after_change(state: WearFilter, mean: Samples, covariance: Samples) 
 
 
 def restart_at_rate(state: WearFilter, mean: Samples, covariance: Samples) -> WearFilter:
-    """Go on from the bank's state after wear has changed its rate, which level and slope lag behind.
+    """Take the present friction and its slope from the bank after wear has changed its rate.
 
-    The present batch stays what it is, offsets of batches before are given up.
+    Level and slope of the filter lag behind; offsets of the batches stay: level = total - present offset.
     """
-    if state.current == state.batches[0]:
-        return from_bank(mean, covariance, state.current)
-    return restart_after_change(state, mean, covariance)
+    place = _offset_index(state.batches, state.current)
+    means, covariances = state.mean.copy(), state.covariance.copy()
+    means[:2], covariances[:2], covariances[:, :2] = mean[:2], 0.0, 0.0
+    covariances[:2, :2] = covariance[:2, :2]
+    if place:
+        means[0] -= state.mean[place]
+        covariances[0, 0] += state.covariance[place, place]
+        covariances[0, 2:] = covariances[2:, 0] = -state.covariance[place, 2:]
+    return WearFilter(state.batches, state.current, means, covariances)
 
 
 def predict(state: WearFilter, cycles: int, level_variance: float, slope_variance: float) -> WearFilter:

@@ -47,7 +47,9 @@ GERMAN: Final = {
     r"friction is found to go unsteadily from cycle to cycle, the past is seen so from here on":
         "die Reibung ändert sich, wie sich zeigt, von Zyklus zu Zyklus unstetig; so wird die "
         "Vergangenheit von nun an gesehen",
-    r"since cycle (\d+) mu_s goes by (\S+) ± (\S+) in 1000 cycles, (\S+) before":
+    r"the cycle is from before wear changed its rate, not used":
+        "der Zyklus ist von vor der Änderung der Verschleißrate, nicht verwendet",
+    r"since cycle (-?\d+) mu_s goes by (\S+) ± (\S+) in 1000 cycles, (\S+) before":
         r"seit Zyklus \1 ändert sich µs um \2 ± \3 in 1000 Zyklen, davor um \4",
     r"no change of batch is reported yet: the scale of the noise is still being learned":
         "noch wird kein Chargenwechsel gemeldet: die Größe des Rauschens wird noch gelernt",
