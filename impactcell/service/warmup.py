@@ -28,7 +28,7 @@ SERIES = 800
 """Estimates of friction that the tracker is given beside the first real cycles, ..."""
 CHANGES = {60: 0.05, 300: 0.012, 500: -0.03}
 """... and cycles of it from which on they are higher by so much, ..."""
-WEAR, RUN_IN = 1e-4, 400
+WEAR, RUN_IN = 1e-4, 720
 """... wear a cycle, and the cycle at which it ends, ..."""
 ANNOUNCED, OUTLIER = 300, 30
 """... one of which begins another batch, said to be one; and a cycle that is an outlier."""

@@ -43,9 +43,11 @@ for batch in type(design.tracker.batch):
     warm_up_for_changes(replace(design, tracker=settings))
     before, state, random = compiled(), TrackerState(), np.random.default_rng(7)
     for cycle in range(1, 1501):
-        mu_s = 0.15 + 2e-5 * cycle + 0.01 * (cycle > 90) - 0.02 * (cycle > 700) + 0.001 * random.normal()
+        step = 0.01 * (cycle > 90) - 0.02 * (cycle > 700)
+        mu_s = 0.15 + 1e-4 * min(cycle, 1200) + step + 0.001 * random.normal()
         given = FrictionObservation(cycle, mu_s, 0.001, cycle * 10**9, "A" if cycle <= 700 else "B")
         state = update(settings, state, given).state
+    assert state.rate_change is not None
     print(sorted(compiled() - before))
 """
 
