@@ -253,15 +253,18 @@ def joined(rows: Samples, rates: Samples, cycle: int, accepted: int, slope_prior
     return run_length_bank.stored(bank, count)
 
 
-def mixture(rows: Samples, rates: Samples, slope_prior: float) -> tuple[Samples, bool]:
-    """Weigh the bank and the hypotheses of another rate alike, and say whether the latter are likelier."""
+def has_rate_changed(rows: Samples, rates: Samples, slope_prior: float) -> bool:
+    """Whether it is likelier that wear goes on at another rate than all that the bank knows."""
+    known, others = run_length_bank.records(rows), run_length_bank.records(rates)
+    weight = run_length_update.log_sum_exp(others, 0, len(others))
+    return bool(weight > run_length_update.weight_by_slopes(known, 0, len(known), slope_prior))
+
+
+def mixture(rows: Samples, rates: Samples, slope_prior: float) -> Samples:
+    """Put the bank and the hypotheses of another rate together, weighed alike."""
     bank = run_length_bank.workspace(rows, len(rows))
     for hypothesis in bank:
         hypothesis["log_weight"] += run_length_update.slope_evidence(
             hypothesis["mean"][SLOPE], hypothesis["covariance"][SLOPE, SLOPE], slope_prior
         )
-    others = run_length_bank.records(rates)
-    is_likelier = run_length_update.log_sum_exp(others, 0, len(others)) > run_length_update.log_sum_exp(
-        bank, 0, len(bank)
-    )
-    return np.vstack([run_length_bank.stored(bank, len(bank)), rates]), bool(is_likelier)
+    return np.vstack([run_length_bank.stored(bank, len(bank)), rates])

@@ -77,10 +77,9 @@ def tracking_result(
         moments, offset, offset_std = _filter_moments(state.filter)
     else:
         blocks, index = state.wear_blocks, state.clock.last
-        bank, is_bent = state.bank, False
-        if len(state.rates):
-            mixture, is_bent = rate_changes.mixture(state.bank, state.rates, _slope_prior(settings, state))
-            bank = mixture if is_bent else bank
+        prior = _slope_prior(settings, state)
+        is_bent = len(state.rates) > 0 and rate_changes.has_rate_changed(state.bank, state.rates, prior)
+        bank = rate_changes.mixture(state.bank, state.rates, prior) if is_bent else state.bank
         moments, offset, offset_std = _bank_moments(bank)
         if blocks is not None and len(blocks.slopes) and not is_bent:
             total = moments.level + offset
