@@ -44,6 +44,8 @@ RISE = 1.5
 """A weight of beta counts so many indentations: breakaway is what the model knows least of."""
 BREAKAWAY_SHARE = 0.3
 """Of `RISE` indentations: what the scatter of the contact reaches at breakaway, though little moves there."""
+HALTING_STD = 0.08
+"""Of what is left over by the discrepancy where a part slides ahead of an actuator that then halts."""
 LOSS_M = 1e-3
 """Displacement beside which a loss of energy in the contact is told."""
 
@@ -55,6 +57,19 @@ def sliding_share(displacement: float, stroke: float, indentation: float) -> flo
         return 0.0
     pushed = 0.0 if math.isinf(stroke) else stroke - indentation
     return min(max((displacement - pushed) / displacement, 0.0), 1.0)
+
+
+@compiled
+def halting_m(displacement: float, stroke: float) -> float:
+    """Return how far a part slides ahead of its actuator, times the share of the way that it is pushed, m.
+
+    There the displacement hardly depends on friction, since what a push loses by it a slide gains; and where
+    friction is not the same for both, as with one that rises at low speed or goes with the position, it moves
+    by more than the discrepancy of either. A strike and a slow push have next to none of it.
+    """
+    if math.isinf(stroke) or not displacement > stroke:
+        return 0.0
+    return (displacement - stroke) * stroke / displacement
 
 
 @compiled

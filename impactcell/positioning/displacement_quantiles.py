@@ -19,8 +19,10 @@ from impactcell.positioning.displacement_discrepancy import (
     BREAKAWAY,
     BREAKAWAY_SHARE,
     FEATURES,
+    HALTING_STD,
     breakaway_features,
     discrepancy_features,
+    halting_m,
     indentation_features,
 )
 from impactcell.positioning.planner_posterior import (
@@ -184,6 +186,7 @@ def displacement_quantiles(
         line[:] = out[j]
         indented_m = max(abs(slope[j]), (1.0 - features[0, j]) * min(depth, line[middle]))
         indented_m = max(indented_m, BREAKAWAY_SHARE * at_breakaway[BREAKAWAY, j])
+        square[j] += (HALTING_STD * halting_m(line[middle], strokes[j])) ** 2
         for q in range(nodes):
             if q != middle:
                 by_itself = scenarios.scatter[q, 0] * line[middle]

@@ -18,6 +18,7 @@ from impactcell.positioning.displacement_discrepancy import (
     BREAKAWAY,
     BREAKAWAY_SHARE,
     FEATURES,
+    HALTING_STD,
     INDENTATION,
 )
 from impactcell.positioning.model_hypotheses import (
@@ -198,6 +199,7 @@ def update_component(mean: Samples, cov: Samples, scatter: Samples, model: TapMo
     prior[:size, :size] = cov
     prior[size, size] = scatter[0]
     floor = np.diag(LEAST_STD**2)
+    unmodelled = POSITION_NOISE_M**2 + (HALTING_STD * model.halting_m) ** 2
     point, after = before.copy(), prior
     weight, surprise, likelihood, crooked = 1.0, 0.0, -math.inf, 0.0
     foretold, rest, reaches = 0.0, 1.0, np.zeros(3)
@@ -218,7 +220,7 @@ def update_component(mean: Samples, cov: Samples, scatter: Samples, model: TapMo
         pushed = (1.0 - model.features[0]) * min(model.indentation_m, by_itself)
         breaking = BREAKAWAY_SHARE * model.indentation_m * float(model.breakaway[BREAKAWAY])
         by_contact = max(by_contact, pushed, breaking)
-        noise = POSITION_NOISE_M**2 + scatter[1] * by_itself**2 + scatter[2] * by_contact**2
+        noise = unmodelled + scatter[1] * by_itself**2 + scatter[2] * by_contact**2
         bent = float(((values - centre - POINTS @ white) ** 2).sum()) / (len(POINTS) - PARAMETERS - 3)
         crooked = max(bent, CROOKED * crooked)
         innovation = moved_m - centre - float(slope @ (before - point))

@@ -10,6 +10,7 @@ from impactcell.positioning.displacement_discrepancy import (
     FEATURES,
     breakaway_features,
     discrepancy_features,
+    halting_m,
     indentation_features,
 )
 from impactcell.positioning.displacement_quantiles import plant_parameters
@@ -26,13 +27,14 @@ Response = Callable[[Samples], Samples]
 
 
 class TapModel(NamedTuple):
-    """Response to a tap, phi, psi and beta of its discrepancy, and the indentation delta (m)."""
+    """Response to a tap, phi, psi and beta of its discrepancy, the indentation delta (m), and `halting_m`."""
 
     response: Response
     features: Samples = NO_FEATURES
     indenting: Samples = NO_FEATURES
     breakaway: Samples = NO_FEATURES
     indentation_m: float = 0.0
+    halting_m: float = 0.0
 
 
 def model_of_tap(tap: Tap, posterior: PlannerPosterior, part: Samples) -> TapModel:
@@ -54,5 +56,6 @@ def model_of_tap(tap: Tap, posterior: PlannerPosterior, part: Samples) -> TapMod
     shift = float(indenting @ mean[PARAMETERS:])
     median = np.concatenate([mean[:PARAMETERS], [0.0, shift]])[None]
     commanded = np.array([tap.stroke_m + indentation * shift, indentation, plant[3]])
-    discrepancy_features(commanded, float(response(median)[0]), part, place, features)
-    return TapModel(response, features, indenting, breakaway, indentation)
+    moved = float(response(median)[0])
+    discrepancy_features(commanded, moved, part, place, features)
+    return TapModel(response, features, indenting, breakaway, indentation, halting_m(moved, tap.stroke_m))

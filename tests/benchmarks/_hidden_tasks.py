@@ -25,6 +25,7 @@ from tests.benchmarks._hidden_conditions import (
     CellTask,
     Condition,
     cell_tasks,
+    draws,
     hidden_effects,
     other_conditions,
 )
@@ -84,7 +85,7 @@ class Cell:
 
     def __init__(self, condition: Condition, seeds: str, cell: int, tasks: Sequence[CellTask]) -> None:
         self.condition, self.number = condition, cell
-        self.rng = np.random.default_rng([SEEDS[seeds] + 1, cell])
+        self.rng = draws(condition, seeds, cell, 1)
         self.planner = TapPlanner(tolerance_m=tasks[0].tolerance_m, plant=NOMINAL)
         self.level = math.nan
         self.shots = max(int(TAPS_A_TASK * len(tasks)), 1)

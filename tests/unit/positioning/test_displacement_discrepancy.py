@@ -11,6 +11,7 @@ from impactcell.positioning.displacement_discrepancy import (
     FEATURES,
     breakaway_features,
     discrepancy_features,
+    halting_m,
     indentation_features,
     largest_weight,
 )
@@ -42,6 +43,14 @@ def test_a_push_has_no_slide_and_a_strike_hardly_anything_else() -> None:
     assert (push[BREAKAWAY:] == 0.0).all()
     assert strike[0] == pytest.approx(1.0 - 0.96e-3 / 20e-3)
     assert indenting()[5] == 1.0  # of the stroke, which a strike that has left its actuator does not follow
+
+
+def test_only_what_slides_ahead_of_an_actuator_that_then_halts_is_unsure_of_it() -> None:
+    assert halting_m(0.9e-3, 1e-3) == 0.0  # pushed all the way
+    assert halting_m(20e-3, math.inf) == 0.0  # struck, and never caught again
+    assert halting_m(0.0, 1e-3) == 0.0
+    assert halting_m(2e-3, 1e-3) == pytest.approx(0.5e-3)
+    assert halting_m(20e-3, 1e-3) < 1e-3  # however far it slides
 
 
 def test_position_counts_from_halfway_along_the_slide_and_direction_by_its_sign() -> None:

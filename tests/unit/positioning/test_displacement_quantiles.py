@@ -9,6 +9,7 @@ import pytest
 from impactcell.positioning.displacement_quantiles import displacement_quantiles, parameter_scenarios
 from impactcell.positioning.planner_posterior import FRICTION, RATIO, prior_of_plant, with_single_gaussian
 from impactcell.positioning.scatter_hypotheses import GRID
+from simulator.plant import Plant, TapInput, simulate_tap
 from simulator.plant_nominal import nominal_taps
 
 STIFFNESS, DAMPING, MU_K, MASS = 5.85e5, 418.5, 0.1725, 32.8
@@ -53,3 +54,35 @@ def test_a_jump_within_three_standard_deviations_is_within_the_band(deviations: 
     beyond = moved(math.exp(jump() + math.copysign(0.1 * std, deviations)))
     assert abs(moved(math.exp(mean_ratio)) - beyond) > 12e-6
     assert band.min() - 1e-6 < beyond < band.max() + 1e-6
+
+
+@pytest.mark.parametrize(("mass", "stroke"), [(18.0, 1.302e-3), (10.0, 1.1e-3)])
+def test_a_slide_ahead_of_a_halting_actuator_is_not_surer_than_friction_along_it(
+    mass: float, stroke: float
+) -> None:
+    """Its displacement hardly depends on friction, but for a wave of friction along the way it does.
+
+    Of 12 %, unknown to the model, wherever in the wave the part lies: 16 standard deviations off before.
+    """
+    velocity, stiffness, damping, mu_k = 0.0239, 6.5e5, 465.0, 0.2
+    posterior = prior_of_plant(stiffness, damping, 1.3 * mu_k, mu_k, 0.0)
+    stds = np.full(posterior.mean.size, 0.003)  # of what has been learned from slides and from pushes
+    stds[:5] = 0.01, 0.01, 0.05, 0.01, 0.1
+    usual = np.zeros((1, len(GRID)))
+    usual[0, int(np.abs(GRID - [0.03, 0.001, 0.005]).sum(axis=1).argmin())] = 1.0
+    posterior = with_single_gaussian(posterior, posterior.mean, np.diag(stds**2))
+    posterior = replace(posterior, scatter_weights=usual)
+    scenarios = parameter_scenarios(posterior, Z, np.array([mass, 9.81]), np.array([0.0, 1.0]))
+    band = np.empty((1, Z.size))
+    displacement_quantiles(velocity, np.array([stroke]), scenarios, Z, band)
+    wave = {"periodic_friction": {"amplitude": 0.12, "period_m": 1.3e-3, "phase_rad": 0.0}}
+    plant = Plant(stiffness, damping, 1.3 * mu_k, mu_k, effects=wave)
+    starts = np.linspace(0.0, 1.3e-3, 13)
+    moved = [
+        simulate_tap(plant, TapInput(velocity, mass, stroke, start_m=start)).displacement_m
+        for start in starts
+    ]
+    middle = float(band[0, Z.size // 2])
+    furthest = (np.array([max(moved), min(moved)]) - middle) / (np.array([band.max(), band.min()]) - middle)
+    assert (furthest > 1.0).all()  # it is not in the model
+    assert (furthest * Z[-1] < 6.5).all()
