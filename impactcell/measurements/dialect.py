@@ -171,7 +171,7 @@ def _ambiguous_number(sample: Sequence[str], delimiter: str, decimal: str) -> st
     for line in sample:
         for cell in split_cells(line, delimiter):
             if decimal in cell and is_missing(cell) is False and parse_number(cell, decimal) is not None:
-                if not is_grouped(cell, other) or cell.lstrip("+-").startswith("0"):
+                if not is_grouped(cell, other):
                     return ""
                 first = first or cell
     return first

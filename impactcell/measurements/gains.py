@@ -68,7 +68,7 @@ def parse_gain(text: str, dimensions: Sequence[Dimension]) -> Gain | None:
     >>> parse_gain("12.5", (Dimension.FORCE,)) is None
     True
     """
-    match = re.fullmatch(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*([^/]+?)\s*(?:/\s*(.+))?", text.strip())
+    match = re.fullmatch(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*([^/]+?)\s*(?:/\s*(.+))?", text.strip())
     value = parse_number(match.group(1)) if match else None
     if match is None or value is None or value == 0.0 or not math.isfinite(value):
         return None

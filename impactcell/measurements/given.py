@@ -29,6 +29,8 @@ NAMES = {"rate": "rate_hz"}
 """Names of constants that carry their unit."""
 OTHERS = (ColumnMeaning.COVARIATE, ColumnMeaning.IGNORED)
 """What several columns can be: said once for each, or as a list in a file."""
+_MARK = " and a decimal point, without separators of thousands"
+"""What a number with a comma may have meant otherwise."""
 SECTIONS = ("columns", "units", "gains", "signs", "constants")
 """Blocks of a mapping file; beside them `excitation` and `trigger`."""
 
@@ -168,7 +170,7 @@ def _trigger(text: str | None, faults: list[str]) -> float | str | None:
     if text is None or text == NO_TRIGGER:
         return text
     match = re.fullmatch(r"(\S+?)\s*([a-zA-Z]*)", text.strip())
-    value = parse_number(match.group(1)) if match else None
+    value = parse_number(match.group(1)) if match and "," not in match.group(1) else None
     unit = parse_unit(match.group(2) or "N") if match else None
     fits = unit is not None and unit.dimension in (Dimension.FORCE, Dimension.TORQUE)
     if value is None or unit is None or not fits or not 0.0 < value < math.inf:
@@ -182,11 +184,13 @@ def _constant(key: str, text: str, faults: list[str]) -> float:
         faults.append(f"{key!r} cannot be set; known: {', '.join(CONSTANTS)}")
         return math.nan
     dimensions, example = CONSTANTS[key]
-    match = re.fullmatch(r"([+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*(.*)", text)
+    match = re.fullmatch(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(.*)", text)
     value = parse_number(match.group(1)) if match else None
     unit = parse_unit(match.group(2) or "1") if match else None
     if value is None or unit is None or unit.dimension not in dimensions or not math.isfinite(value):
-        faults.append(f"{key} is {text!r}; write it with its unit, as {key}={example}")
+        faults.append(
+            f"{key} is {text!r}; write it with its unit{_MARK if ',' in text else ''}, as {key}={example}"
+        )
         return math.nan
     number = value * unit.factor
     if number == 0.0 or (number < 0.0 and key != "direction"):

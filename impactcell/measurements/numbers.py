@@ -22,7 +22,7 @@ def _patterns(decimal: str) -> tuple[re.Pattern[str], re.Pattern[str]]:
     separators = "[" + re.escape("".join(sign for sign in ".,'’ " + _SPACES if sign != decimal)) + "]"
     tail = rf"(?:{mark}[0-9]*)?(?:[eEdD][+-]?[0-9]+)?"
     plain = rf"[+-]?(?:[0-9]+{tail}|{mark}[0-9]+(?:[eEdD][+-]?[0-9]+)?)"
-    grouped = rf"[+-]?[0-9]{{1,3}}(?:({separators})[0-9]{{3}})(?:\1[0-9]{{3}})*{tail}"
+    grouped = rf"[+-]?[1-9][0-9]{{0,2}}(?:({separators})[0-9]{{3}})(?:\1[0-9]{{3}})*{tail}"
     return re.compile(plain), re.compile(grouped)
 
 
@@ -49,6 +49,25 @@ def parse_number(cell: str, decimal: str = ".") -> float | None:
         digits = "".join(sign for sign in text if sign in "0123456789+-eEdD" or sign == decimal)
         return float(digits.replace(decimal, ".").replace("d", "e").replace("D", "e"))
     return None
+
+
+def split_stated(text: str, decimal: str) -> tuple[float | None, str]:
+    """Take the number that a text begins with off what follows it; None where it begins with none.
+
+    In the file's decimal mark, or the other where that fails.
+
+    Examples
+    --------
+    >>> split_stated("3.000 mm/min", ","), split_stated("18.9kg", ","), split_stated("0.050 m/s", ",")
+    ((3000.0, 'mm/min'), (18.9, 'kg'), (0.05, 'm/s'))
+    """
+    match = re.fullmatch(r"([+-]?[0-9.,'’]+(?:[eE][+-]?[0-9]+)?)\s*(.*)", text.strip().replace("−", "-"))
+    if match is None:
+        return None, text
+    value = parse_number(match[1], decimal)
+    if value is None:
+        value = parse_number(match[1], "," if decimal == "." else ".")
+    return value, match[2]
 
 
 def is_grouped(cell: str, decimal: str) -> bool:

@@ -1,12 +1,18 @@
 """Step of time of a table that has no column of it, as given or as the file says beside its columns."""
 
 import math
+import re
 from collections.abc import Mapping
 
-from impactcell.measurements.numbers import parse_number
+from impactcell.measurements.numbers import split_stated
 from impactcell.measurements.recognition import RATE_WORDS, STEP_WORDS, normalised
 from impactcell.measurements.table import Table
 from impactcell.measurements.units import Dimension, parse_unit, split_unit
+
+SAMPLES = re.compile(r"([kM]?)(?:S|Sa|samples?|Messwerte)/(?:s|sec)|([kM]?)sps", re.IGNORECASE)
+"""Writings of a number of samples a second."""
+THOUSANDS = {"": 1.0, "k": 1e3, "m": 1e6}
+"""What stands before them, in lower case."""
 
 
 def sampling_step_s(table: Table, constants: Mapping[str, float]) -> float | None:
@@ -14,27 +20,34 @@ def sampling_step_s(table: Table, constants: Mapping[str, float]) -> float | Non
     if "rate_hz" in constants:
         return 1.0 / constants["rate_hz"]
     for key, text in table.attributes.items():
-        step = _step(key, text)
+        step = _step(key, text, table.decimal)
         if step is not None and 0.0 < step < math.inf:
             return step
     return None
 
 
-def _step(key: str, text: str) -> float | None:
+def _step(key: str, text: str, decimal: str) -> float | None:
     name, unit_of_key = split_unit(key)
     name = normalised(name)
-    number = _first_number(text)
+    number, rest = split_stated(text, decimal)
     if number is None or not 0.0 < number < math.inf:
         return None
+    unit = rest.strip("[]() ") or unit_of_key or ""
     if any(word == name or name.startswith(word) for word in RATE_WORDS.split()):
-        return 1.0 / (number * (1e3 if "khz" in (key + text).lower() else 1.0))
+        factor = _factor(unit, Dimension.FREQUENCY)
+        return None if factor is None else 1.0 / (number * factor)
     if any(word == name or name.startswith(word) for word in STEP_WORDS.split()):
-        unit = parse_unit(text.rsplit(maxsplit=1)[-1] if len(text.split()) > 1 else unit_of_key or "")
-        return number * (unit.factor if unit and unit.dimension is Dimension.TIME else 1.0)
+        factor = _factor(unit, Dimension.TIME)
+        return None if factor is None else number * factor
     return None
 
 
-def _first_number(text: str) -> float | None:
-    first = text.split(maxsplit=1)[0] if text.split() else ""
-    value = parse_number(first)
-    return value if value is not None else parse_number(first, ",")
+def _factor(unit: str, dimension: Dimension) -> float | None:
+    """Factor to SI of a unit as it is written, 1 where none is; None where it is of something else."""
+    samples = SAMPLES.fullmatch(unit)
+    if samples is not None and dimension is Dimension.FREQUENCY:
+        return THOUSANDS[(samples[1] or samples[2] or "").lower()]
+    known = parse_unit(unit)
+    if known is None:
+        return None if unit else 1.0
+    return known.factor if known.dimension is dimension else None

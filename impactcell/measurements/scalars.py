@@ -8,7 +8,7 @@ import numpy as np
 from impactcell.campaign import COLUMNS, LARGEST
 from impactcell.measurements.assignment import Assignment
 from impactcell.measurements.mapping import Mapping
-from impactcell.measurements.numbers import parse_number
+from impactcell.measurements.numbers import split_stated
 from impactcell.measurements.recognition import (
     TOKEN_MATCH,
     VOCABULARY,
@@ -33,6 +33,11 @@ REQUIREMENTS = {
     ColumnMeaning.DWELL: "0 or above", ColumnMeaning.START: "finite",
 }  # fmt: skip
 """What a scalar of a campaign has to be."""
+EXAMPLES = {
+    ColumnMeaning.VELOCITY: "'velocity=3000 mm/min'", ColumnMeaning.MASS: "mass=18.9kg",
+    ColumnMeaning.DIRECTION: "direction=1", ColumnMeaning.DWELL: "dwell=30s",
+}  # fmt: skip
+"""How a scalar is given for all shots."""
 TAKEN_NAMES = {
     *ColumnMeaning, *(name for names in COLUMNS.values() for name in names.values()),
     "shot", "time_s", "velocity_mm_per_min", "dwell_s",
@@ -47,10 +52,16 @@ def scalars_of(table: Table, place: str, mapping: Mapping, faults: list[str]) ->
     """
     given = mapping.given.constants
     scalars: dict[str, float | str] = {}
-    for meaning, value in said_beside(table).items():
+    for meaning, (value, *others) in _all_beside(table).items():
         if str(meaning) in given:
             continue
-        if _is_possible(meaning, value, f"{place}: {meaning}", faults):
+        if others and meaning in EXAMPLES:
+            unit = VOCABULARY[meaning].dimensions[0].value
+            faults.append(
+                f"{place}: the lines beside the columns say {meaning} {value:g} {unit} and {others[0]:g} "
+                f"{unit}; {_way_out(meaning)}"
+            )
+        elif not others and _is_possible(meaning, value, f"{place}: {meaning}", faults):
             scalars[str(meaning)] = value
     names = covariate_names(mapping)
     for item in mapping.assignments:
@@ -82,12 +93,8 @@ def _is_possible(meaning: ColumnMeaning, value: float | str, where: str, faults:
 
 
 def _way_out(meaning: ColumnMeaning) -> str:
-    examples = {
-        ColumnMeaning.VELOCITY: "'velocity=3000 mm/min'", ColumnMeaning.MASS: "mass=18.9kg",
-        ColumnMeaning.DIRECTION: "direction=1", ColumnMeaning.DWELL: "dwell=30s",
-    }  # fmt: skip
-    if meaning in examples:
-        return f"give it for all shots with --set {examples[meaning]}"
+    if meaning in EXAMPLES:
+        return f"give it for all shots with --set {EXAMPLES[meaning]}"
     return "leave its column out with --column ignored=NAME"
 
 
@@ -168,26 +175,47 @@ def covariate_name(column: str, dimension: Dimension | None) -> str:
 
 
 def said_beside(table: Table) -> dict[ColumnMeaning, float | str]:
-    """Quantities that the file says beside its columns, as `Masse: 18,9 kg`."""
-    said: dict[ColumnMeaning, float | str] = {}
+    """Quantities of which the file says one value beside its columns, as `Masse: 18,9 kg`."""
+    return {meaning: values[0] for meaning, values in _all_beside(table).items() if len(values) == 1}
+
+
+def _all_beside(table: Table) -> dict[ColumnMeaning, list[float | str]]:
+    """Every value that the lines beside the columns say of a quantity by the name that fits it best.
+
+    `Masse` goes before `Masse Greifer`.
+    """
+    said: dict[ColumnMeaning, list[float | str]] = {}
+    scores: dict[ColumnMeaning, float] = {}
     for key, text in table.attributes.items():
-        name, unit_text = split_unit(key)
-        for meaning in SCALARS:
-            score = name_score(name, meaning)[0]
-            # Nothing else is in mm/min: there a word inside a longer one will do, as in "Vorschubgeschw".
-            is_named = score > 0.0 if meaning is ColumnMeaning.VELOCITY else score >= TOKEN_MATCH
-            if not is_named and not is_kind_of(name, meaning):
-                continue
-            words = text.split()
-            number = parse_number(words[0]) if words else None
-            if number is None and words:
-                number = parse_number(words[0], ",")
-            unit = parse_unit(unit_text or " ".join(words[1:]))
-            if meaning is ColumnMeaning.BATCH:
-                said[meaning] = text
-            elif meaning is ColumnMeaning.DIRECTION and number is not None:
-                said[meaning] = number
-            elif number is not None and unit is not None and unit.dimension in VOCABULARY[meaning].dimensions:
-                said[meaning] = number * unit.factor
-            break
+        found = _quantity_beside(key, text, table.decimal)
+        if found is None or found[1] < scores.get(found[0], -1.0):
+            continue
+        meaning, score, value = found
+        if score > scores.get(meaning, -1.0):
+            said[meaning], scores[meaning] = [], score
+        if value not in said[meaning]:
+            said[meaning].append(value)
     return said
+
+
+def _quantity_beside(key: str, text: str, decimal: str) -> tuple[ColumnMeaning, float, float | str] | None:
+    """Give what a line beside the columns says of which quantity, and how sure its name is."""
+    name, unit_text = split_unit(key)
+    for meaning in SCALARS:
+        score = name_score(name, meaning)[0]
+        # Nothing else is in mm/min: there a word inside a longer one will do, as in "Vorschubgeschw".
+        is_named = score > 0.0 if meaning is ColumnMeaning.VELOCITY else score >= TOKEN_MATCH
+        if not is_named and not is_kind_of(name, meaning):
+            continue
+        number, rest = split_stated(text, decimal)
+        unit = parse_unit(unit_text or rest)
+        if meaning is ColumnMeaning.BATCH:
+            return meaning, score, text
+        if number is None:
+            return None
+        if meaning is ColumnMeaning.DIRECTION:
+            return meaning, score, number
+        if unit is not None and unit.dimension in VOCABULARY[meaning].dimensions:
+            return meaning, score, number * unit.factor
+        return None
+    return None

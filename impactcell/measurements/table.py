@@ -51,6 +51,8 @@ class Table:
         How it was read: dialect, header, what was left out.
     lines : Lines or None
         Line of each row, counted from 1; None where the file has no lines.
+    decimal : str
+        Decimal mark of numbers that the file writes as text.
     """
 
     source: str
@@ -59,6 +61,7 @@ class Table:
     attributes: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     lines: Lines | None = None
+    decimal: str = "."
 
     @property
     def title(self) -> str:

@@ -1,6 +1,7 @@
 """Reads a text file of numbers in any dialect; every cell that is no number is told with its line."""
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -8,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from impactcell.errors import MeasurementError
-from impactcell.measurements.dialect import Dialect, decode, detect, split_cells
+from impactcell.measurements.dialect import Dialect, decode, detect, later_lines, split_cells
 from impactcell.measurements.faults import MAX_FAULTS_TOLD
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.numbers import parse_number
@@ -46,6 +47,7 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
             attributes=layout.attributes,
             notes=tuple(notes),
             lines=numbers,
+            decimal=decimal,
         ),
     )
 
@@ -62,22 +64,43 @@ def _lines(text: str, source: str, limits: Limits) -> list[str]:
     return lines
 
 
+_SEPARATORS = ";,\t|"
 _OPENS = re.compile(r'(?:^|[,;|\t])\s*"')
 """A cell that begins with a quote; one within a cell, as the inch of `Weg ["]`, is a sign like any other."""
 
 
 def _joined(lines: list[str]) -> list[str]:
-    """Lines with what a quoted cell broke in two put together; the rest of it becomes blank lines."""
+    """Lines with what a quoted cell broke in two put together; the rest of it becomes blank lines.
+
+    A line that has all the separators of a row by itself is a row, and no rest of the one before.
+    """
     joined = list(lines)
+    separator, count_of_row = _separators_of_row(lines)
     for index in range(len(lines)):
         if '"' not in joined[index] or not _OPENS.search(joined[index]):
             continue
         count = 0
         while joined[index].count('"') % 2 and count < 3 and index + count + 1 < len(lines):
+            if count_of_row and lines[index + count + 1].count(separator) == count_of_row:
+                break
             count += 1
             joined[index] += " " + joined[index + count]
             joined[index + count] = ""
     return joined
+
+
+def _separators_of_row(lines: list[str]) -> tuple[str, int]:
+    """Give the sign that most lines have equally often, and how often."""
+    sample = later_lines(lines)
+    commonest = {
+        sign: Counter(line.count(sign) for line in sample if sign in line).most_common(1)
+        for sign in _SEPARATORS
+    }
+    often = {sign: counts[0] for sign, counts in commonest.items() if counts}
+    if not often:
+        return "", 0
+    sign = max(often, key=lambda each: often[each][1])
+    return sign, often[sign][0]
 
 
 def _where(layout: Layout) -> str:

@@ -21,6 +21,8 @@ HEADER_ROWS = 4
 """Rows above the numbers that may be names, units and descriptions."""
 COMMENT_SIGNS = ("#", "%", "//")
 """Begin of a line that is no row."""
+NO_VALUE = re.compile(r"#(?:nv|n/a)(?=[;,|\s]|$)", re.IGNORECASE)
+"""Begin of a row whose first cell has no value, as spreadsheets write it."""
 
 UNIT_LABELS = frozenset(("unit", "units", "einheit", "einheiten"))
 """What stands before the units of a row, and is none of them."""
@@ -142,7 +144,7 @@ def _named(
 def is_comment(line: str) -> bool:
     """Whether a line is blank or begins as a comment does."""
     text = line.strip()
-    return not text or text.startswith(COMMENT_SIGNS)
+    return not text or (text.startswith(COMMENT_SIGNS) and not NO_VALUE.match(text))
 
 
 def _body(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, frozenset[int]]:

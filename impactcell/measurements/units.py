@@ -98,14 +98,17 @@ _TEMPERATURES = (("degC", 1.0, 273.15), ("degF", 5.0 / 9.0, 459.67 * 5.0 / 9.0))
 """Symbol, kelvins a degree, and where its zero lies [K] (BIPM; Fahrenheit's by ITS-90)."""
 _WORDS = {
     "sec": "s", "second": "s", "seconds": "s", "sekunde": "s", "sekunden": "s", "msec": "ms",
-    "millisekunden": "ms", "milliseconds": "ms", "microseconds": "us", "usec": "us", "minutes": "min",
+    "millisekunde": "ms", "millisekunden": "ms", "millisecond": "ms", "milliseconds": "ms",
+    "mikrosekunde": "us", "mikrosekunden": "us", "microsecond": "us", "microseconds": "us", "usec": "us",
+    "minutes": "min",
     "newton": "N", "newtons": "N", "kilonewton": "kN", "newtonmeter": "Nm", "meter": "m", "metre": "m",
     "meters": "m", "metres": "m", "millimeter": "mm", "millimetre": "mm", "millimeters": "mm", "micron": "um",
     "microns": "um", "mikrometer": "um", "micrometer": "um", "inch": "in", "inches": "in", '"': "in",
     "degree": "deg", "degrees": "deg", "grad": "deg", "°": "deg", "radian": "rad", "radians": "rad",
     "lbs": "lb", "°c": "degC", "°f": "degF", "u/min": "rpm", "1/min": "rpm", "1/s": "Hz", "volt": "V",
     "ampere": "A", "kilogram": "kg", "kilogramm": "kg", "percent": "%", "-": "1", "hz": "Hz", "khz": "kHz",
-    "kn": "kN", "dan": "daN", "pa": "Pa", "mpa": "MPa",
+    "kn": "kN", "dan": "daN", "pa": "Pa", "mpa": "MPa", "hertz": "Hz", "kilohertz": "kHz",
+    "megahertz": "MHz",
 }  # fmt: skip
 """Other writings of a unit, in lower case."""
 _RATES = {

@@ -100,6 +100,13 @@ FAULTS: Final = (
         "Stöße angeben",
     ),
     _Fault(
+        r"the lines beside the columns say (?P<meaning>\w+) (?P<one>.+) and (?P<other>.+); give it .*",
+        "the lines beside the columns say {meaning} {one} and {other}; give it for all shots in the form "
+        "below",
+        "die Zeilen neben den Spalten sagen {meaning} {one} und {other}; unten im Formular für alle Stöße "
+        "angeben",
+    ),
+    _Fault(
         r"the force shows no contact \(largest (?P<largest>.+) N above noise of (?P<noise>.+) N\); .*",
         "the force shows no contact (largest {largest} N above noise of {noise} N); give the force "
         "at contact in the form below",

@@ -25,6 +25,7 @@ from impactcell.measurements import (
     write_campaign,
 )
 from impactcell.measurements.given import read_given
+from impactcell.measurements.scalars import said_beside, scalars_of
 from impactcell.measurements.units import split_unit
 from impactcell.prediction import estimate_from_features
 from impactcell.prediction.joint_plant_fit import fit_plant
@@ -503,3 +504,43 @@ def test_one_more_time_is_no_covariate() -> None:
     time = 1e-3 * np.arange(200)
     mapping = guess([table(t=("s", time), clock=(None, 7.0 + 3.0 * time), x=("mm", np.cos(time)))])
     assert [item.meaning for item in mapping.assignments if item.column == "clock"] == [ColumnMeaning.IGNORED]
+
+
+def beside(directory: Path, *lines: str) -> Table:
+    path = directory / "x.csv"
+    rows = "\n".join(f"{n},5;{n % 7},25" for n in range(40))
+    path.write_text("\n".join(lines) + f"\n\nZeit [ms];Kraft [N]\n{rows}", encoding="utf-8")
+    (table,) = read_tables(path)
+    return table
+
+
+def test_a_quantity_beside_the_columns_is_that_of_the_name_that_fits_best(tmp_path: Path) -> None:
+    lines = (
+        "Masse: 18,900 kg",
+        "Masse Greifer: 4,2 kg",
+        "Vorschub: 3.000 mm/min",
+        "Max. Vorschub: 4000 mm/min",
+    )
+    said = said_beside(beside(tmp_path, *lines, "Rückzugsgeschwindigkeit: 12000 mm/min"))
+    assert said[ColumnMeaning.MASS] == pytest.approx(18.9)
+    assert said[ColumnMeaning.VELOCITY] == pytest.approx(0.05)
+
+
+def test_two_masses_beside_the_columns_are_refused_unless_one_is_given(tmp_path: Path) -> None:
+    table = beside(tmp_path, "Masse Teil: 18,9 kg", "Masse mit Greifer: 23,1 kg", "Vorschub: 3000 mm/min")
+    with pytest.raises(MeasurementError, match=r"say mass 18.9 kg and 23.1 kg; give it .* --set mass=18.9kg"):
+        make_campaign((table,), guess((table,)))
+    faults: list[str] = []
+    mapping = guess((table,), Given(constants={"mass": 23.1}))
+    assert str(ColumnMeaning.MASS) not in scalars_of(table, "x.csv", mapping, faults)
+    assert not faults
+
+
+@pytest.mark.parametrize("text", ["mass=18,900kg", "stroke=1,500 mm", "mass=1,5kg"])
+def test_a_comma_in_what_is_set_is_neither_a_decimal_mark_nor_a_separator(text: str) -> None:
+    with pytest.raises(MeasurementError, match=r"with its unit and a decimal point, without separators"):
+        read_given({"constants": [text]})
+    with pytest.raises(MeasurementError, match="is neither a force"):
+        read_given({}, trigger="1,500 N")
+    with pytest.raises(MeasurementError, match="the gain of force is"):
+        read_given({"gains": ["force=1,500 N/V"]})

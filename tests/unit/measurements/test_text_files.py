@@ -256,3 +256,57 @@ def test_a_broken_first_row_is_no_preamble(tmp_path: Path) -> None:
     path.write_text("t,F\n0.0,oops\n" + "\n".join(f"{i},{i}" for i in range(1, 40)), encoding="utf-8")
     with pytest.raises(MeasurementError, match=r":2: '0.0,oops' is neither"):
         one(path)
+
+
+@pytest.mark.parametrize(
+    ("said", "step_s"),
+    [
+        ("Abtastrate: 0,01 MHz", 1e-4), ("Abtastrate: 10.000 Hz", 1e-4), ("Abtastrate: 10 kS/s", 1e-4),
+        ("Abtastrate: 10kHz", 1e-4), ("Abtastrate: 20000", 5e-5), ("Abtastrate [kHz]: 10", 1e-4),
+        ("Abtastrate: 10 Umdrehungen", None), ("Abtastrate: 10 ms", None),
+        ("Abtastintervall: 0,1 Millisekunde", 1e-4), ("Abtastintervall: 100 µs", 1e-4),
+        ("Abtastintervall: 0,001", 1e-3), ("Abtastintervall: 10 Takte", None),
+    ],
+)  # fmt: skip
+def test_a_rate_beside_the_columns_is_taken_in_its_unit_or_not_at_all(
+    tmp_path: Path, said: str, step_s: float | None
+) -> None:
+    """In the decimal mark of the file; nothing that is not known counts as Hz or s."""
+    path = tmp_path / "a.csv"
+    rows = "\n".join(f"{i},25;{i},5" for i in range(40))
+    path.write_text(f"Messung 7\n{said}\n\nKraft [N];Weg [mm]\n{rows}", encoding="utf-8")
+    table = one(path)
+    assert table.decimal == ","
+    step = sampling_step_s(table, {})
+    assert step is None if step_s is None else step == pytest.approx(step_s, rel=1e-12)
+
+
+def test_no_group_of_thousands_begins_with_nought(tmp_path: Path) -> None:
+    """Times with a decimal point beside a decimal comma are no whole numbers."""
+    path = tmp_path / "a.csv"
+    rows = [f"{i / 1000:.3f};{0.5 * i:.2f};{-0.25 * i:.3f}".split(";") for i in range(999)]
+    lines = [";".join([time, force.replace(".", ","), way.replace(".", ",")]) for time, force, way in rows]
+    path.write_text("Zeit [s];Kraft [N];Weg [mm]\n" + "\n".join(lines), encoding="utf-8")
+    time = one(path).columns[0]
+    assert time.text is not None
+    assert time.text[:2] == ("0.000", "0.001")
+
+
+def test_a_quote_that_is_never_closed_swallows_no_row(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    rows = [f"{i};{2 * i};" + ('"contact' if i in (7, 20) else "") for i in range(40)]
+    path.write_text("t [s];F [N];remark\n" + "\n".join(rows), encoding="utf-8")
+    table = one(path)
+    assert table.columns[1].values == pytest.approx(2.0 * np.arange(40))
+    assert table.columns[2].text is not None
+    assert table.columns[2].text[7] == "contact"
+
+
+@pytest.mark.parametrize("sign", ["#NV", "#N/A"])
+def test_a_row_whose_first_cell_has_no_value_is_no_comment(tmp_path: Path, sign: str) -> None:
+    path = tmp_path / "a.csv"
+    rows = [f"{sign if i % 9 == 4 else i};{i / 8:g}" for i in range(40)]
+    path.write_text("# by hand\nF [N];t [s]\n" + "\n".join(rows), encoding="utf-8")
+    table = one(path)
+    assert table.columns[1].values == pytest.approx(np.arange(40) / 8)
+    assert np.flatnonzero(np.isnan(table.columns[0].values)).tolist() == [4, 13, 22, 31]

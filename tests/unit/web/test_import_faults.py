@@ -21,6 +21,8 @@ FILES = {
     "no contact": f"Zeit [ms];Kraft [N];Weg [mm];Geschwindigkeit [mm/min]\n{ZEROS}",
     "two masses": "Zeit [ms];Kraft [N];Masse [kg]\n"
     + "".join(f"{n};{n % 7};{n % 2 + 1}\n" for n in range(60)),
+    "masses beside": "Masse Teil: 2 kg\nMasse Greifer: 1 kg\n\nZeit [ms];Kraft [N]\n"
+    + "".join(f"{n};{n % 7}\n" for n in range(60)),
     "no mass": "Zeit [ms];Kraft [N];Masse [kg]\n" + "".join(f"{n};{n % 7};-1\n" for n in range(60)),
 }
 
