@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from impactcell.cell import in_place_of
+from impactcell.cell import PROVISIONAL, in_place_of
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.own_taps import compare_on_own_taps
 from impactcell.errors import PredictionError, SettingsError
@@ -91,6 +91,11 @@ def restore_model(cell: Path, *, as_json: bool = False) -> None:
     in_service = target.read_bytes()
     write_model(model, target)
     previous.write_bytes(in_service)
+    if PROVISIONAL in model.provenance:
+        print_note(
+            f"{model.name} is the guess that `impactcell model fit` replaced: nothing of it was measured, "
+            f"and wear and batches have learned by another model; fit again, or restore again"
+        )
     _tell(
         {"cell": cell_config.name, "model": model.name, "previous": str(previous)},
         f"{cell_config.name} runs with model {model.name} from the next cycle on, as before",

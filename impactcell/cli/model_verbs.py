@@ -54,7 +54,7 @@ def model_fit(
 
 @verb(model, "restore")
 def model_restore(cell: Cell, *, as_json: AsJson = False) -> None:
-    """Put the model back into service that the last `model accept` replaced."""
+    """Put the model back into service that the last `model accept` or `model fit` replaced."""
     from impactcell.cli.accept_model import restore_model
 
     restore_model(cell, as_json=as_json)

@@ -141,12 +141,12 @@ def _alarm_line(raised: RaisedAlarm) -> str:
 
 
 def _note_lines(notes: Sequence[tuple[int, str]]) -> list[str]:
-    """Give a line to each kind of note: those alike but for their figures are told once, with how many."""
+    """Give a line to each kind of note: of those alike but for their figures the last, with how many."""
     alike: dict[str, list[tuple[int, str]]] = {}
     for cycle, note in notes:
         alike.setdefault(FIGURES.sub("", note), []).append((cycle, note))
     lines = []
-    for (cycle, note), *others in alike.values():
-        more = f" (and {len(others)} more like this, the last at cycle {others[-1][0]})" if others else ""
+    for *others, (cycle, note) in alike.values():
+        more = f" (and {len(others)} more like this, the first at cycle {others[0][0]})" if others else ""
         lines.append(f"cycle {cycle}: {note}{more}")
     return lines

@@ -74,11 +74,12 @@ def _told(tap: Features, capture: Capture) -> Features:
 
 
 def is_late(fit: PlantFit, taps: Sequence[Features]) -> bool:
-    """Whether first contact lies farther from t = 0 than a sampling step, by taps as they were fitted."""
-    return abs(fit.onset_s) > max(sampling_step_s(tap.capture) for tap in taps)
+    """Whether first contact lies farther from t = 0 than a sampling step, by a fit that explains its taps."""
+    return fit.gap < GAP_ENOUGH and abs(fit.onset_s) > max(sampling_step_s(tap.capture) for tap in taps)
 
 
 def onset_sentence(onset_s: float) -> str:
     """Say where first contact lies, by the times of a recorder that is taken to begin there."""
     side = "before" if onset_s < 0.0 else "after"
-    return f"first contact lies {1e6 * abs(onset_s):.2g} µs {side} t = 0 in these taps"
+    rounded_us = float(f"{1e6 * abs(onset_s):.2g}")
+    return f"first contact lies {rounded_us:g} µs {side} t = 0 in these taps"

@@ -217,6 +217,15 @@ class PositioningSection(Section):
     overshoot_probability: Probability = 0.001
     """Accepted chance that a task overshoots."""
 
+    @model_validator(mode="after")
+    def _seen_by_the_encoder(self) -> Self:
+        if self.tolerance_um < self.encoder_resolution_um:
+            raise ValueError(
+                f"tolerance_um {self.tolerance_um:g} is finer than encoder_resolution_um "
+                f"{self.encoder_resolution_um:g}: raise it"
+            )
+        return self
+
 
 class OpcUaSection(Section):
     """The OPC UA server; cells with the same endpoint share one."""

@@ -299,6 +299,7 @@ def test_the_first_taps_of_the_journal_make_the_model(
     assert "users file" not in told_beside, "which is nothing that taps show"
     run("model", "restore", cell)
     assert read_cell(cell).model.name == "own-provisional"
+    assert "nothing of it was measured" in capsys.readouterr().err
 
 
 def change(content: dict[str, Any], path: str, value: Any) -> None:

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+import impactcell
 from impactcell.cli.track import track
 from impactcell.errors import SeriesError
 
@@ -214,7 +215,20 @@ def test_a_counter_that_begins_anew_and_a_late_cycle_are_in_order(tmp_path, caps
 def test_notes_that_are_alike_are_one_line(tmp_path, capsys):
     track(write(tmp_path / "s.csv", truth(60, at=0), std=0.0))
     (line,) = [line for line in capsys.readouterr().out.splitlines() if "standard deviation" in line]
-    assert line.endswith("(and 59 more like this, the last at cycle 59)")
+    assert line.startswith("cycle 59: ")
+    assert line.endswith("(and 59 more like this, the first at cycle 0)")
+
+
+def test_of_several_rates_the_one_in_force_is_shown(tmp_path, capsys):
+    """A surface that runs in: its first change of rate says nothing of what it does now."""
+    cycles = np.arange(800)
+    values = 0.2 + 0.03 * -np.expm1(-cycles / 120.0) + np.random.default_rng(3).normal(0.0, 0.002, 800)
+    path = write(tmp_path / "s.csv", values)
+    told = [note for _, note in impactcell.track(cycles, values, np.full(800, 0.002)).notes]
+    rates = [note for note in told if "in 1000 cycles" in note]
+    assert len(rates) > 1
+    track(path)
+    assert rates[-1] in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("limit", [math.nan, math.inf, -1.0, 0.0])

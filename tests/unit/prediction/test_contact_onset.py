@@ -10,7 +10,7 @@ import pytest
 from impactcell.api.first_model import fit_first_model
 from impactcell.campaign.recorded_campaign import from_captures
 from impactcell.features import extract
-from impactcell.prediction.contact_onset import fit_plant_and_onset, is_late
+from impactcell.prediction.contact_onset import GAP_ENOUGH, fit_plant_and_onset, is_late, onset_sentence
 from impactcell.records import Capture, Channel
 from tests.taps import Tap
 
@@ -59,6 +59,15 @@ def test_contact_stays_where_it_is_said_to_be_if_that_is_not_what_is_wrong(
     fit, used = fit_plant_and_onset([extract(tap) for tap in triggered(0.0, effects)[0]], 9.81)
     assert not is_late(fit, used)
     assert [tap.capture.onset_std_s for tap in used] == pytest.approx([5e-6] * len(used))
+
+
+def test_no_trigger_is_called_late_where_that_does_not_explain_the_taps() -> None:
+    """The part is damped by its speed, which no moment of contact makes up for."""
+    damped = {"viscous_friction": {"viscous_coefficient_n_s_per_m": 85.0}}
+    fit, used = fit_plant_and_onset([extract(tap) for tap in triggered(0.0, damped)[0]], 9.81)
+    assert fit.gap > GAP_ENOUGH
+    assert not is_late(fit, used)
+    assert onset_sentence(1e-4).startswith("first contact lies 100 µs after")
 
 
 def test_a_first_model_asks_for_an_earlier_trigger() -> None:

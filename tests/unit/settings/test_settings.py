@@ -70,6 +70,11 @@ def test_every_fault_at_once_with_its_place(config: Path) -> None:
             "wear_warning_probability_off must be below",
         ),
         ("wear_limit: 0.25", "wear_limit: 0.2\n  wear_warning_cycles: -1", "wear_warning_cycles"),
+        (
+            "format: 1",
+            "format: 1\npositioning: {tolerance_um: 0.5}",
+            "tolerance_um 0.5 is finer than encoder_resolution_um 1: raise it",
+        ),
         ("format: 1", "format: 2", "format"),
         ("cell: prototype", "cell: 7", "valid string"),
         ("../models/prototype.yaml", "none.yaml", "no file"),
