@@ -12,10 +12,12 @@ MAX_TEXT = 200
 """Characters of a property that are kept."""
 
 
-def column_of(name: str, unit: str | None, values: Any) -> MeasuredColumn | None:
-    """Give the column of an array of numbers, moments or text; None for what is none of these.
+def column_of(
+    name: str, unit: str | None, values: Any, origin: np.datetime64 | None = None
+) -> MeasuredColumn | None:
+    """Give the column of an array of numbers, moments, durations or text; None for what is none of these.
 
-    Moments become seconds from the first.
+    Moments become seconds from `origin`, else from the first; durations become seconds.
     """
     try:
         array = np.asarray(values)
@@ -27,7 +29,11 @@ def column_of(name: str, unit: str | None, values: Any) -> MeasuredColumn | None
     if short is None:
         name, short = split_unit(name)
     if array.dtype.kind == "M":
-        seconds = (array - array[0]) / np.timedelta64(1, "ns") * 1e-9
+        told = array[~np.isnat(array)]
+        first = told[0] if told.size else array[0]
+        array = array - (first if origin is None else origin)
+    if array.dtype.kind == "m":
+        seconds = array / np.timedelta64(1, "ns") * 1e-9
         return MeasuredColumn(name, "s", np.asarray(seconds, dtype=np.float64))
     if array.dtype.kind in "biuf":
         return MeasuredColumn(name, short, np.ascontiguousarray(array, dtype=np.float64))
@@ -47,11 +53,15 @@ def tables_of(
     group: str = "",
     attributes: Mapping[str, object] | None = None,
     note: str = "",
+    origin: np.datetime64 | None = None,
 ) -> list[Table]:
-    """Give the tables of named arrays: those of one length share one, in order of appearance."""
+    """Give the tables of named arrays: those of one length share one, in order of appearance.
+
+    Moments count from `origin`, where there is one.
+    """
     by_length: dict[int, list[MeasuredColumn]] = {}
     for name, unit, values in columns:
-        column = column_of(name, unit, values)
+        column = column_of(name, unit, values, origin)
         if column is not None:
             by_length.setdefault(len(column.values), []).append(column)
     said = {str(key): _word(value)[:MAX_TEXT] for key, value in (attributes or {}).items()}

@@ -15,6 +15,8 @@ MAX_DEPTH = 8
 """Groups within groups that are looked into."""
 UNIT_KEYS = ("unit", "units", "Unit", "Units", "Einheit", "unit_string")
 """Attributes that hold the unit of a data set."""
+SCALE, OFFSET, FILLS = "scale_factor", "add_offset", ("_FillValue", "missing_value")
+"""Attributes of a data set that is packed as the CF conventions of netCDF have it."""
 
 
 def read_hdf5(path: Path, limits: Limits) -> tuple[Table, ...]:
@@ -45,6 +47,7 @@ def _read_group(
     """Read the tables of a group and of those within; the cells read so far."""
     depth, cells = spent
     columns: list[tuple[str, str | None, Any]] = []
+    told: list[str] = []
     for name in group:
         link = group.get(name, getlink=True)
         if not isinstance(link, h5py.HardLink) or name.startswith("#"):
@@ -55,11 +58,11 @@ def _read_group(
                 cells = _read_group(h5py, item, path, limits, (depth + 1, cells), tables)
             continue
         cells = _count(item, path, limits, cells)
-        columns += _columns(name, item)
+        columns += _columns(name, item, path, told)
     limits.check_shape(f"{path}: {group.name}", 0, len(columns))
     attributes = {key: _plain(value) for key, value in group.attrs.items()}
     note = "HDF5" if group.name == "/" else f"HDF5 group {group.name}"
-    tables += tables_of(str(path), columns, group.name.strip("/"), attributes, note)
+    tables += tables_of(str(path), columns, group.name.strip("/"), attributes, "".join([note, *told]))
     return cells
 
 
@@ -73,14 +76,14 @@ def _count(item: Any, path: Path, limits: Limits, cells: int) -> int:
     )
 
 
-def _columns(name: str, item: Any) -> list[tuple[str, str | None, Any]]:
+def _columns(name: str, item: Any, path: Path, told: list[str]) -> list[tuple[str, str | None, Any]]:
     unit = next((str(_plain(item.attrs[key])) for key in UNIT_KEYS if key in item.attrs), None)
     if not item.size or item.ndim not in (1, 2) or (item.dtype.hasobject and item.dtype.kind != "O"):
         return []
     if item.dtype.names:
         records = item[()]
         return [(field, unit, records[field]) for field in item.dtype.names if records[field].ndim == 1]
-    values = item.asstr()[()] if item.dtype.kind == "O" else item[()]
+    values = item.asstr()[()] if item.dtype.kind == "O" else _unpacked(item, path, told)
     if values.ndim == 1:
         return [(name, unit, values)]
     if values.shape[0] < values.shape[1]:
@@ -93,6 +96,41 @@ def _columns(name: str, item: Any) -> list[tuple[str, str | None, Any]]:
         (titles[i] if titles else f"{name} {i + 1}", unit, np.ascontiguousarray(values[:, i]))
         for i in range(values.shape[1])
     ]
+
+
+def _unpacked(item: Any, path: Path, told: list[str]) -> Any:
+    """Give raw * scale_factor + add_offset of a data set, nan where raw is one of its fills; tell of that."""
+    raw = item[()]
+    if raw.dtype.kind not in "iuf":
+        return raw
+    values, place, name = raw, f"{path}: {item.name}", item.name.rpartition("/")[2]
+    if SCALE in item.attrs:
+        scale = _number(place, SCALE, item.attrs[SCALE])
+        values = values * np.float64(scale)
+        told.append(f", {name} by its {SCALE} {scale:g}")
+    if OFFSET in item.attrs:
+        offset = _number(place, OFFSET, item.attrs[OFFSET])
+        values = values + np.float64(offset)
+        told.append(f", {name} by its {OFFSET} {offset:g}")
+    for key in FILLS:
+        fills = np.ravel(item.attrs.get(key, ()))
+        if not fills.size or fills.dtype.kind not in "iuf":
+            continue
+        empty = np.isin(raw, fills.astype(raw.dtype) if raw.dtype.kind == "f" else fills)
+        if empty.any():
+            values = np.where(empty, np.nan, values)
+            told.append(f", {name}: {np.count_nonzero(empty)} values left out by its {key}")
+    return values
+
+
+def _number(place: str, key: str, said: Any) -> float:
+    number = np.ravel(said)
+    if number.size == 1 and number.dtype.kind in "iuf" and np.isfinite(number[0]):
+        return float(number[0])
+    raise MeasurementError(
+        f"{place}: its {key} is {str(_plain(said))[:40]!r}, where one number is needed; correct it, or apply "
+        f"it and remove the attribute"
+    )
 
 
 def _plain(value: Any) -> Any:

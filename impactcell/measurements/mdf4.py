@@ -7,6 +7,8 @@ import traceback
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from impactcell.errors import MeasurementError
 from impactcell.measurements.arrays import tables_of
 from impactcell.measurements.limits import Limits
@@ -67,14 +69,31 @@ def _discard_half_made(error: BaseException | None) -> None:
 
 
 def _group(file: Any, number: int, group: Any, path: Path) -> list[Table]:
+    """Read the channels of a group; samples that are flagged invalid are nan at their times."""
     columns: list[tuple[str, str | None, Any]] = []
+    left_out: list[str] = []
     master = file.masters_db.get(number)
     for index, channel in enumerate(group.channels):
         if index == master:
             continue
-        signal = file.get(group=number, index=index, raw=False)
+        signal = file.get(group=number, index=index, raw=False, ignore_invalidation_bits=True)
         if not columns:
             columns.append(("time", "s", signal.timestamps))
-        columns.append((channel.name, signal.unit or None, signal.samples))
+        samples = signal.samples
+        if signal.invalidation_bits is not None and np.any(signal.invalidation_bits):
+            invalid = np.asarray(signal.invalidation_bits, dtype=bool)
+            samples = _without(samples, invalid)
+            left_out.append(f", {channel.name}: {np.count_nonzero(invalid)} samples flagged invalid left out")
+        columns.append((channel.name, signal.unit or None, samples))
     name = getattr(group.channel_group, "acq_name", "") or f"group {number}"
-    return tables_of(str(path), columns, name, note=f"MDF {name}")
+    return tables_of(str(path), columns, name, note=f"MDF {name}{''.join(left_out)}")
+
+
+def _without(samples: Any, invalid: Any) -> Any:
+    """Give samples with nothing in place of those that are invalid."""
+    if samples.dtype.kind == "V":
+        return samples  # records, which are no column
+    is_number = samples.dtype.kind in "biuf"
+    kept = samples.astype(np.float64 if is_number else object)
+    kept[invalid] = np.nan if is_number else None
+    return kept

@@ -45,9 +45,11 @@ def records_of(tables: Sequence[Table], mapping: Mapping) -> list[Record]:
     Raises
     ------
     MeasurementError
-        A file lacks a column, its time does not increase, or a text stands where a number has to.
+        A file lacks a column, its time does not increase, a text stands where a number has to, or a rate
+        is given for one table of a file where another has times of its own.
     """
-    faults: list[str] = []
+    faults = _contrary_clocks(tables, mapping)
+    raise_faults(faults)
     records: list[tuple[str, Record]] = []
     for table in tables:
         for part, place in _parts(table, mapping, faults):
@@ -63,6 +65,23 @@ def records_of(tables: Sequence[Table], mapping: Mapping) -> list[Record]:
     if not records:
         raise MeasurementError("no table holds a channel")
     return [record for _, record in records]
+
+
+def _contrary_clocks(tables: Sequence[Table], mapping: Mapping) -> list[str]:
+    """Tell tables that a given rate would count for beside one of the same file with times of its own."""
+    time = mapping.of(ColumnMeaning.TIME)
+    if time is None or "rate_hz" not in mapping.given.constants:
+        return []
+    channels = {item.column for item in mapping.assignments if item.meaning in CHANNELS}
+    measured = [table for table in tables if any(column.name in channels for column in table.columns)]
+    timed = {table.source: table for table in measured if table.column(time.column) is not None}
+    return [
+        f"{table.title}: has no column of time, where {timed[table.source].title} has {time.column!r}, and "
+        f"the rate does not say how the two stand to each other; export both with their times, or say "
+        f"--column 'ignored={time.column}' for the rate to count for both"
+        for table in measured
+        if table.source in timed and table.column(time.column) is None
+    ]
 
 
 def _parts(table: Table, mapping: Mapping, faults: list[str]) -> list[tuple[Table, str]]:

@@ -18,7 +18,7 @@ def read_parquet(path: Path, limits: Limits) -> tuple[Table, ...]:
     Raises
     ------
     MeasurementError
-        It is too large, damaged, or pyarrow is not installed.
+        It is too large, damaged, without rows, or pyarrow is not installed.
     """
     library = reader_library("pyarrow.parquet", "Parquet", path)
     try:
@@ -30,6 +30,8 @@ def read_parquet(path: Path, limits: Limits) -> tuple[Table, ...]:
         raise
     except Exception as error:
         raise MeasurementError(f"{path}: is a damaged Parquet file: {_first_line(error)}") from error
+    if not data.num_rows:
+        raise MeasurementError(f"{path}: has no rows")
     columns = [(field.name, _unit(field), _values(data.column(i))) for i, field in enumerate(data.schema)]
     said = {
         key.decode("utf-8", "replace"): value

@@ -29,6 +29,28 @@ FAULTS: Final = (
         "hat keine Zeitspalte; unten im Formular wählen, oder dort die Abtastrate angeben",
     ),
     _Fault(
+        r"has no column of time, where (?P<other>.+) has '(?P<column>.+?)', and the rate .*",
+        "has no column of time, where {other} has “{column}”, and the rate does not say how the two stand to "
+        "each other; export both with their times, and take the rate out of the form below",
+        "hat keine Zeitspalte, {other} aber „{column}“, und die Abtastrate sagt nicht, wie beide zueinander "
+        "liegen; beide mit ihren Zeiten ausgeben und die Abtastrate aus dem Formular nehmen",
+    ),
+    _Fault(
+        r"channel (['\"])(?P<column>.+)\2 of group (['\"])(?P<group>.+)\4 does not say at which moment .*",
+        "channel “{column}” of group “{group}” does not say at which moment it begins, where others of the "
+        "file begin at different ones; give it its wf_start_time, or export all with one time",
+        "Kanal „{column}“ der Gruppe „{group}“ sagt nicht, wann er beginnt, andere der Datei beginnen aber "
+        "zu verschiedenen Zeiten; ihm seine wf_start_time geben oder alle mit einer Zeit ausgeben",
+    ),
+    _Fault(
+        r"its (?P<key>scale_factor|add_offset) is (['\"])(?P<value>.*)\3, where one number .*",
+        "its {key} is “{value}”, where one number is needed; correct it, or apply it and remove "
+        "the attribute",
+        "{key} ist „{value}“, muss aber eine Zahl sein; berichtigen, oder damit umrechnen und das Attribut "
+        "entfernen",
+    ),
+    _Fault(r"has no rows", "has no rows", "hat keine Zeilen"),
+    _Fault(
         r"neither position nor force was found among (?P<names>.+); name them with --column .*",
         "neither position nor force was found among {names}; choose their columns in the form below",
         "weder Position noch Kraft gefunden unter {names}: ihre Spalten unten im Formular wählen",
