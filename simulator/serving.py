@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import errno
 import json
 import signal
 import sys
@@ -146,7 +147,9 @@ def run(
     try:
         interrupted = asyncio.run(serve(scenario, registers, truth_file, verbose=verbose))
     except OSError as error:
-        print(f"{scenario.name}: cannot listen or write: {error.strerror or error}", file=sys.stderr)  # noqa: T201
+        way_out = "; --port chooses another" if error.errno == errno.EADDRINUSE else ""
+        told = f"{scenario.name}: cannot listen or write: {error.strerror or error}{way_out}"
+        print(told, file=sys.stderr)  # noqa: T201
         return 1
     if interrupted:
         raise KeyboardInterrupt

@@ -161,4 +161,6 @@ def test_a_port_that_is_taken(tmp_path: Path, capsys: pytest.CaptureFixture[str]
         taken.listen()
         port = taken.getsockname()[1]
         assert main(["serve", str(CONFIG / "sim" / "demo.yaml"), "--port", str(port)]) == 1
-    assert "cannot listen" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "cannot listen" in told
+    assert "--port chooses another" in told
