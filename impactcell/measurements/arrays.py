@@ -17,7 +17,7 @@ def column_of(
 ) -> MeasuredColumn | None:
     """Give the column of an array of numbers, moments, durations or text; None for what is none of these.
 
-    Moments become seconds from `origin`, else from the first; durations become seconds.
+    Moments become seconds from `origin`, else from the first, durations seconds; complex numbers are text.
     """
     try:
         array = np.asarray(values)
@@ -37,7 +37,7 @@ def column_of(
         return MeasuredColumn(name, "s", np.asarray(seconds, dtype=np.float64))
     if array.dtype.kind in "biuf":
         return MeasuredColumn(name, short, np.ascontiguousarray(array, dtype=np.float64))
-    if array.dtype.kind in "OSU":
+    if array.dtype.kind in "OSUc":
         try:
             numbers = np.array([np.nan if cell is None else float(cell) for cell in array.tolist()])
         except (TypeError, ValueError, OverflowError):

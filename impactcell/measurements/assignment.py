@@ -1,6 +1,7 @@
 """What a column was taken for, and what has to be given before a campaign can be written."""
 
 from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,12 +65,15 @@ def ascends(values: Samples) -> bool:
 
 
 def lacking(
-    assignments: Sequence[Assignment], constants: Mapping[str, float], tables: Sequence[Table]
+    assignments: Sequence[Assignment],
+    constants: Mapping[str, float],
+    tables: Sequence[Table],
+    told: AbstractSet[ColumnMeaning] = frozenset(),
 ) -> list[str]:
-    """Say what has to be given first."""
+    """Say what has to be given first; nothing of the quantities whose lack has been `told` already."""
     faults = [fault for item in assignments for fault in _of_column(item)]
     faults += _contradictions(assignments)
-    present = {item.meaning for item in assignments}
+    present = {*told, *(item.meaning for item in assignments)}
     if ColumnMeaning.TIME not in present and any(
         sampling_step_s(table, constants) is None for table in tables
     ):
@@ -91,12 +95,7 @@ def _of_column(item: Assignment) -> list[str]:
         return []
     faults = []
     if item.unit is None:
-        rotates = name_score(item.column, item.meaning)[1] in ROTATION_WORDS
-        unit = VOCABULARY[item.meaning].dimensions[1 if rotates else 0].value
-        faults.append(
-            f"column {item.column!r} ({item.meaning}) has no unit; say --unit '{item.column}={unit}', or "
-            f"which it is"
-        )
+        faults.append(no_unit(item))
     elif item.unit.dimension not in VOCABULARY[item.meaning].dimensions:
         faults.append(
             f"column {item.column!r} ({item.meaning}) is in {item.unit.symbol}; "
@@ -108,6 +107,16 @@ def _of_column(item: Assignment) -> list[str]:
             f"'{item.meaning}={item.column}', or name the right one"
         )
     return faults
+
+
+def no_unit(item: Assignment) -> str:
+    """Say that a column has no unit, and which it may be."""
+    rotates = name_score(item.column, item.meaning)[1] in ROTATION_WORDS
+    unit = VOCABULARY[item.meaning].dimensions[1 if rotates else 0].value
+    return (
+        f"column {item.column!r} ({item.meaning}) has no unit; say --unit '{item.column}={unit}', or "
+        f"which it is"
+    )
 
 
 def _way_to_unit(item: Assignment, meaning: ColumnMeaning, unit: MeasuredUnit) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from impactcell.errors import MeasurementError
 from impactcell.measurements.arrays import tables_of
 from impactcell.measurements.limits import Limits
+from impactcell.measurements.natural_order import natural_key
 from impactcell.measurements.optional import damage_told, reader_library
 from impactcell.measurements.table import Table
 
@@ -21,6 +22,8 @@ SCALE, OFFSET, FILLS = "scale_factor", "add_offset", ("_FillValue", "missing_val
 
 def read_hdf5(path: Path, limits: Limits) -> tuple[Table, ...]:
     """Read a table of each group: its vectors, the columns of its matrices and of its records.
+
+    Groups come in the order of their names, `shot10` after `shot9`.
 
     Raises
     ------
@@ -48,7 +51,7 @@ def _read_group(
     depth, cells = spent
     columns: list[tuple[str, str | None, Any]] = []
     told: list[str] = []
-    for name in group:
+    for name in sorted(group, key=natural_key):
         link = group.get(name, getlink=True)
         if not isinstance(link, h5py.HardLink) or name.startswith("#"):
             continue  # links may lead out of the file, or round in a circle; # is MATLAB's own

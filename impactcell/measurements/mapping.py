@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError
 from impactcell.measurements.assignment import SURE, Assignment, ascends, changes_within, counts_rows, lacking
+from impactcell.measurements.column_units import contrary_units, measured_unit, unit_of, without_unit
 from impactcell.measurements.gains import Gain
 from impactcell.measurements.recognition import (
     UNIT_ALONE,
@@ -16,6 +17,7 @@ from impactcell.measurements.recognition import (
     name_score,
 )
 from impactcell.measurements.table import MeasuredColumn, Table
+from impactcell.measurements.text_channels import text_channels
 from impactcell.measurements.units import Dimension, MeasuredUnit, parse_unit
 
 GIVEN = 1.0
@@ -124,8 +126,12 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
     assignments = tuple(
         chosen.get(name) or _further(column, given, speed) for name, column in columns.items()
     )
-    faults = [*lacking(assignments, given.constants, tables), *_without_use(assignments, given, tables)]
-    faults += [*_unused_gains(assignments, given, columns), *_contrary_units(tables, given)]
+    texts = text_channels(assignments, tables)
+    faults = [fault for _, fault in texts.values()]
+    faults += lacking(assignments, given.constants, tables, {meaning for meaning, _ in texts.values()})
+    faults += [*_without_use(assignments, given, tables), *_unused_gains(assignments, given, columns)]
+    faults += without_unit(tables, assignments, given.units, given.gains)
+    faults += contrary_units(tables, given.units)
     return Mapping(assignments, given, tuple(faults))
 
 
@@ -147,26 +153,6 @@ def _without_use(assignments: Sequence[Assignment], given: Given, tables: Sequen
     return faults
 
 
-def _contrary_units(tables: Sequence[Table], given: Given) -> list[str]:
-    """Tell columns of one name that are in one unit in one table and in another in the next."""
-    first: dict[str, tuple[str, str]] = {}
-    faults: dict[str, str] = {}
-    for table in tables:
-        for column in table.columns:
-            unit = parse_unit(column.unit) if column.unit is not None else None
-            if column.unit is None or unit is None or column.name in given.units:
-                continue
-            title, text = first.setdefault(column.name, (table.title, column.unit))
-            before = parse_unit(text)
-            if before is not None and replace(before, symbol=unit.symbol) != unit:
-                faults.setdefault(
-                    column.name,
-                    f"column {column.name!r} is in {text} in {title} and in {column.unit} in {table.title}; "
-                    f"import the files one by one, or say the unit of all with --unit '{column.name}={text}'",
-                )
-    return list(faults.values())
-
-
 def _unused_gains(
     assignments: Sequence[Assignment], given: Given, columns: AbstractMapping[str, MeasuredColumn]
 ) -> list[str]:
@@ -180,7 +166,7 @@ def _unused_gains(
                 f"a gain of the {meaning} was given, and no column is the {meaning}; name it with --column "
                 f"{meaning}=NAME, or take the gain away"
             )
-        elif (unit := _unit_of(columns[name], given)) and gain.measured(unit) is None:
+        elif (unit := unit_of(columns[name], given.units)) and gain.measured(unit) is None:
             faults.append(
                 f"column {name!r} ({meaning}) is in {unit.symbol}, of which a gain of {gain.text} says "
                 f"nothing; take it away, or say --unit '{name}={gain.signal.symbol}'"
@@ -210,30 +196,19 @@ def _check_given(columns: AbstractMapping[str, MeasuredColumn], given: Given) ->
         raise MeasurementError("\n".join(faults))
 
 
-def _unit_of(column: MeasuredColumn, given: Given) -> MeasuredUnit | None:
-    text = given.units.get(column.name) or column.unit
-    return None if text is None else parse_unit(text)
-
-
-def _measured(unit: MeasuredUnit | None, meaning: ColumnMeaning, given: Given) -> MeasuredUnit | None:
-    """Give the unit of what is measured, where a gain says what the signal in a column stands for."""
-    gain = given.gains.get(meaning)
-    return unit if gain is None else gain.measured(unit) or unit
-
-
 def _candidates(column: MeasuredColumn, given: Given, columns: Sequence[MeasuredColumn]) -> list[Assignment]:
     """Whatever a column could be, with how sure it is."""
-    unit = _unit_of(column, given)
+    unit = unit_of(column, given.units)
     if column.name in given.others:
         return []
     named = [meaning for meaning, name in given.columns.items() if name == column.name]
     if named:
-        return [Assignment(column.name, named[0], _measured(unit, named[0], given), GIVEN, "given")]
+        return [Assignment(column.name, named[0], measured_unit(unit, named[0], given.gains), GIVEN, "given")]
     found = []
     for meaning in PRIORITY:
         if meaning in given.columns:
             continue
-        measured = _measured(unit, meaning, given)
+        measured = measured_unit(unit, meaning, given.gains)
         score, why = _score(column, meaning, measured, columns, given)
         if score > 0.0:
             found.append(Assignment(column.name, meaning, measured, score, why))
@@ -267,7 +242,9 @@ def _score_by_unit(unit: MeasuredUnit, columns: Sequence[MeasuredColumn], given:
     """How sure a unit alone makes what a column is."""
     if unit.dimension is not Dimension.NONE:
         same = [
-            other for other in columns if (of := _unit_of(other, given)) and of.dimension is unit.dimension
+            other
+            for other in columns
+            if (of := unit_of(other, given.units)) and of.dimension is unit.dimension
         ]
         if len(same) == 1:
             return UNIT_ALONE + 0.1, f"the only column in {unit.symbol}"
@@ -284,7 +261,7 @@ def _further(column: MeasuredColumn, given: Given, speed: Dimension | None) -> A
 
     The mean of a `speed` that changes within a shot says nothing that the position does not.
     """
-    unit = _unit_of(column, given)
+    unit = unit_of(column, given.units)
     if column.name in given.others:
         return Assignment(column.name, given.others[column.name], unit, GIVEN, "given")
     if column.text is None and len(column.values) > 2 and counts_rows(column.values):

@@ -1,6 +1,5 @@
 """Reads a measurement file of any kind into tables; the kind is told from its first bytes."""
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +11,7 @@ from impactcell.measurements.json_file import read_json
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.matlab import read_matlab
 from impactcell.measurements.mdf4 import read_mdf4
+from impactcell.measurements.natural_order import natural_key
 from impactcell.measurements.parquet import read_parquet
 from impactcell.measurements.table import Table
 from impactcell.measurements.tdms import read_tdms
@@ -90,17 +90,3 @@ def _packed(path: Path, limits: Limits, dialect: Dialect | None) -> tuple[Table,
     if not tables:
         raise MeasurementError(f"{path}: holds no files")
     return tuple(tables)
-
-
-def natural_key(name: str) -> list[tuple[int, int, str]]:
-    """Key under which `shot10` comes after `shot9`.
-
-    Examples
-    --------
-    >>> sorted(["shot10", "shot9"], key=natural_key)
-    ['shot9', 'shot10']
-    """
-    return [
-        (0, int(part), "") if part.isdigit() and part.isascii() else (1, 0, part)
-        for part in re.split(r"(\d+)", name)
-    ]

@@ -156,9 +156,12 @@ def _body(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, froz
     width = Counter(map(len, rows)).most_common(1)[0][0]
     rows = [row for row in rows if len(row) == width]
     rows = rows[len(rows) // 2 :] if len(filled) < SAMPLED_LINES else rows
+    spread = [split_cells(line, delimiter) for line in filled[:: len(filled) // HEAD_LINES + 1]]
     numeric = set()
     for column in range(width):
         cells = [row[column] for row in rows if not is_missing(row[column])]
+        if not cells:  # a channel that ended before the others
+            cells = [row[column] for row in spread if len(row) == width and not is_missing(row[column])]
         numbers = sum(parse_number(cell, decimal) is not None for cell in cells)
         if cells and numbers >= NUMERIC_SHARE * len(cells):
             numeric.add(column)

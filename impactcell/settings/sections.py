@@ -24,6 +24,7 @@ from impactcell.settings.fields import (
     cell_name,
     opcua_endpoint,
 )
+from impactcell.settings.positioning_section import PositioningSection
 from impactcell.settings.web_section import WebSection
 from impactcell.tracking.signature.tracker import SignatureSettings
 from impactcell.tracking.wear_batch import TrackerSettings
@@ -203,28 +204,6 @@ class SignatureSection(Section):
     """Number of grid points."""
     learning_cycles: Annotated[int, Field(ge=10)] = _SIGNATURE.learned_cycles
     """Cycles from which the cell learns how its cycles vary before any is judged."""
-
-
-class PositioningSection(Section):
-    """Placing the part by taps."""
-
-    tolerance_um: Positive = 50.0
-    """The part is in place when it is this near its target."""
-    travel_mm: Positive = 40.0
-    """Targets beyond this are refused."""
-    encoder_resolution_um: Positive = 1.0
-    """A tolerance below this is refused."""
-    overshoot_probability: Probability = 0.001
-    """Accepted chance that a task overshoots."""
-
-    @model_validator(mode="after")
-    def _seen_by_the_encoder(self) -> Self:
-        if self.tolerance_um < self.encoder_resolution_um:
-            raise ValueError(
-                f"tolerance_um {self.tolerance_um:g} is finer than encoder_resolution_um "
-                f"{self.encoder_resolution_um:g}: raise it"
-            )
-        return self
 
 
 class OpcUaSection(Section):

@@ -90,6 +90,28 @@ FAULTS: Final = (
         "ablegen oder unten im Formular eine Einheit für alle angeben",
     ),
     _Fault(
+        COLUMN + r" holds text, as (?P<cell>.+), where the (?P<meaning>\w+) is needed; .*",
+        "column “{column}” holds text, as {cell}, where the {meaning} is needed; correct the cell, or choose "
+        "another column as the {meaning} in the form below",
+        "Spalte „{column}“ enthält Text, etwa {cell}, wo „{meaning}“ nötig ist; die Zelle berichtigen oder "
+        "unten im Formular eine andere Spalte dafür wählen",
+    ),
+    _Fault(
+        COLUMN + r" holds units in its cells, as (?P<cell>.+), where the (?P<meaning>\w+) is needed; .*",
+        "column “{column}” holds units in its cells, as {cell}, where the {meaning} is needed; put the unit "
+        "behind the name of the column, or choose another column as the {meaning} in the form below",
+        "Spalte „{column}“ enthält Einheiten in den Zellen, etwa {cell}, wo „{meaning}“ nötig ist; die "
+        "Einheit hinter den Namen der Spalte setzen oder unten im Formular eine andere Spalte dafür wählen",
+    ),
+    _Fault(
+        r"has no (?P<meaning>\w+), which (?P<other>.+) has as column (?P<quote>['\"])(?P<column>.+?)"
+        r"(?P=quote); call it so here too, .*",
+        "has no {meaning}, which {other} has as column “{column}”; call it so here too, or drop the files "
+        "one by one",
+        "ohne „{meaning}“, in {other} ist sie Spalte „{column}“; die Spalte hier ebenso nennen oder die "
+        "Dateien einzeln ablegen",
+    ),
+    _Fault(
         r"the times are those of " + COLUMN + r", so that the rate has no use; .*",
         "the times are those of column “{column}”, so that the rate has no use; take it out of the "
         "form below",

@@ -23,6 +23,9 @@ FILES = {
     + "".join(f"{n};{n % 7};{n % 2 + 1}\n" for n in range(60)),
     "masses beside": "Masse Teil: 2 kg\nMasse Greifer: 1 kg\n\nZeit [ms];Kraft [N]\n"
     + "".join(f"{n};{n % 7}\n" for n in range(60)),
+    "channel as text": "Zeit [ms];Kraft [N];Weg [µm]\n"
+    + "".join(f"{n};{n % 7};{'OVER' if n > 30 else n}\n" for n in range(60)),
+    "units in cells": "Zeit [ms];Kraft [N];Weg\n" + "".join(f"{n};{n % 7};{n} µm\n" for n in range(60)),
     "no mass": "Zeit [ms];Kraft [N];Masse [kg]\n" + "".join(f"{n};{n % 7};-1\n" for n in range(60)),
 }
 
@@ -58,3 +61,29 @@ def test_a_rate_beside_times_is_told_to_have_no_use(tmp_path: Path) -> None:
         "de",
         "die Zeiten stehen in Spalte „Zeit“, die Abtastrate hat keinen Zweck; aus dem Formular nehmen",
     )
+
+
+def test_what_a_second_file_lacks_is_said_in_both_languages(tmp_path: Path) -> None:
+    heads = {
+        "a": "Zeit [ms];Kraft [N];Weg [mm]",
+        "b": "Zeit [ms];Kraft [N];Weg 1 [mm]",
+        "c": "Zeit;Kraft;Weg",
+    }
+    for name, head in heads.items():
+        rows = "".join(f"{n};{n % 7};{n * n}\n" for n in range(60))
+        (tmp_path / f"{name}.csv").write_text(f"{head}\n{rows}", encoding="utf-8")
+    first, second, third = (read_tables(tmp_path / f"{name}.csv") for name in heads)
+    with pytest.raises(MeasurementError) as error:
+        make_campaign((*first, *second), guess((*first, *second)))
+    lacks = str(error.value)
+    assert page_fault(lacks, "en")[1] == (
+        f"{tmp_path / 'b.csv'}: has no position, which {tmp_path / 'a.csv'} has as column “Weg”; call it so "
+        "here too, or drop the files one by one"
+    )
+    assert page_fault(lacks, "de")[1].startswith(f"{tmp_path / 'b.csv'}: ohne „Position“, in ")
+    units = guess((*first, *third)).faults
+    assert [page_fault(fault, "de")[1] for fault in units] == [
+        f"{tmp_path / 'c.csv'}: Spalte „{name}“ ({meaning}) hat keine Einheit; unten im Formular angeben, "
+        f"etwa {unit}"
+        for name, meaning, unit in (("Zeit", "Zeit", "s"), ("Kraft", "Kraft", "N"), ("Weg", "Position", "m"))
+    ]

@@ -1,0 +1,63 @@
+"""Unit of a column: as its file says it, as it was given, and where the files do not say the same."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from impactcell.measurements.assignment import UNITLESS, Assignment, no_unit
+from impactcell.measurements.gains import Gain
+from impactcell.measurements.recognition import ColumnMeaning
+from impactcell.measurements.table import MeasuredColumn, Table
+from impactcell.measurements.units import MeasuredUnit, parse_unit
+
+
+def unit_of(column: MeasuredColumn, units: Mapping[str, str]) -> MeasuredUnit | None:
+    """Give the unit of a column, as given by its name or as its file says; None where neither is known."""
+    text = units.get(column.name) or column.unit
+    return None if text is None else parse_unit(text)
+
+
+def measured_unit(
+    unit: MeasuredUnit | None, meaning: ColumnMeaning, gains: Mapping[ColumnMeaning, Gain]
+) -> MeasuredUnit | None:
+    """Give the unit of what is measured, where a gain says what the signal in a column stands for."""
+    gain = gains.get(meaning)
+    return unit if gain is None else gain.measured(unit) or unit
+
+
+def without_unit(
+    tables: Sequence[Table],
+    assignments: Sequence[Assignment],
+    units: Mapping[str, str],
+    gains: Mapping[ColumnMeaning, Gain],
+) -> list[str]:
+    """Tell columns that have their unit from another table, and none that is known in their own."""
+    items = {item.column: item for item in assignments}
+    faults: dict[str, str] = {}
+    for table in tables:
+        for column in table.columns:
+            item = items[column.name]
+            if item.unit is None or item.meaning in UNITLESS:
+                continue
+            if measured_unit(unit_of(column, units), item.meaning, gains) is None:
+                faults.setdefault(column.name, f"{table.title}: {no_unit(item)}")
+    return list(faults.values())
+
+
+def contrary_units(tables: Sequence[Table], units: Mapping[str, str]) -> list[str]:
+    """Tell columns of one name that are in one unit in one table and in another in the next."""
+    first: dict[str, tuple[str, str]] = {}
+    faults: dict[str, str] = {}
+    for table in tables:
+        for column in table.columns:
+            unit = parse_unit(column.unit) if column.unit is not None else None
+            if column.unit is None or unit is None or column.name in units:
+                continue
+            title, text = first.setdefault(column.name, (table.title, column.unit))
+            before = parse_unit(text)
+            if before is not None and replace(before, symbol=unit.symbol) != unit:
+                faults.setdefault(
+                    column.name,
+                    f"column {column.name!r} is in {text} in {title} and in {column.unit} in {table.title}; "
+                    f"import the files one by one, or say the unit of all with --unit '{column.name}={text}'",
+                )
+    return list(faults.values())
