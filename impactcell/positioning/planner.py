@@ -3,7 +3,6 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
 
 import numpy as np
 
@@ -11,8 +10,9 @@ from impactcell.errors import PositioningError
 from impactcell.physics import Plant, free_motion
 from impactcell.positioning import model_hypotheses
 from impactcell.positioning.action_selection import select_action
+from impactcell.positioning.compiling import compile_planning
 from impactcell.positioning.displacement_quantiles import displacement_quantiles, parameter_scenarios
-from impactcell.positioning.dynamic_programming import Goal, nearer
+from impactcell.positioning.dynamic_programming import nearer
 from impactcell.positioning.friction_along_stroke import StrokeFriction, update_stroke_friction
 from impactcell.positioning.lookahead_table import (
     LookaheadTable,
@@ -39,6 +39,8 @@ WORTH_A_STEP = 0.05
 LEAST_STEP_M = 1e-6
 """An encoder's resolution: a tap that is to move less is made only where there is no other."""
 BAND_Z = np.linspace(-3.29, 3.29, 67)  # 99.9 %; close together, since a displacement may fold over
+MOST_STILL = 10
+"""Taps in a row that move nothing, after which the rest of the way is out of reach."""
 REMEMBERED = 64  # tables, of parts of different mass
 
 
@@ -81,6 +83,8 @@ class TapPlanner:
     _limits: PlannerLimits = field(init=False, repr=False)
     _profile: StrokeFriction | None = field(init=False, repr=False, default=None)
     _lookaheads: list[LookaheadTable] = field(init=False, repr=False, default_factory=list)
+    _asked_m: float = field(init=False, repr=False, default=math.nan)
+    _still: int = field(init=False, repr=False, default=0)
 
     def __post_init__(self) -> None:
         """Refuse what no cell can have, and start from the nominal plant."""
@@ -101,7 +105,7 @@ class TapPlanner:
             self.tolerance_m, self.max_velocity_m_s, self.max_stroke_m, self.max_force_n,
             self.overshoot_probability,
         )  # fmt: skip
-        _ready()
+        compile_planning()
         self._posterior = model_hypotheses.prior(
             plant.stiffness_n_per_m,
             plant.damping_n_s_per_m,
@@ -162,6 +166,11 @@ class TapPlanner:
                 "and this cell cannot push it back"
             )
         distance = abs(remaining_m)
+        if self._is_stuck(remaining_m):
+            return Unreachable(
+                f"{distance * 1e6:.1f} µm remain, {MOST_STILL} taps in a row have moved nothing, and any that "
+                f"moves more overshoots with a probability above {self.overshoot_probability:.2g}"
+            )
         part = self._part(mass_kg)
         place = np.array([position_m, math.copysign(1.0, remaining_m)])
         scenarios = parameter_scenarios(self._posterior, Z, part, place)
@@ -217,6 +226,7 @@ class TapPlanner:
         """
         if not (math.isfinite(moved_m) and math.isfinite(mass_kg) and mass_kg > 0.0):
             raise PositioningError(f"cannot learn from a displacement of {moved_m} m of {mass_kg} kg")
+        self._still = self._still + 1 if abs(moved_m) < LEAST_STEP_M else 0
         part = self._part(mass_kg)
         place = np.array([tap.position_m, float(tap.direction)])
         band = self._band(tap.velocity_m_s, tap.stroke_m, part, place)
@@ -258,6 +268,13 @@ class TapPlanner:
             tap.velocity_m_s, tap.stroke_m, stiffest(self._posterior), mass_kg, self._gravity
         )
 
+    def _is_stuck(self, remaining_m: float) -> bool:
+        """Whether too many taps in a row have left the part where it lies; who asks again begins anew."""
+        is_same = abs(remaining_m - self._asked_m) < LEAST_STEP_M
+        stuck = is_same and self._still >= MOST_STILL
+        self._asked_m, self._still = remaining_m, 0 if stuck or not is_same else self._still
+        return stuck
+
     def _part(self, mass_kg: float) -> Samples:
         return np.concatenate(
             [[mass_kg, self._gravity], [] if self._profile is None else self._profile.warp()]
@@ -280,21 +297,3 @@ class TapPlanner:
             lookahead = build_lookahead(self._limits, self._posterior, part, place, lookahead)
         self._lookaheads = [*self._lookaheads[1 - REMEMBERED :], lookahead]
         return lookahead
-
-
-@cache
-def _ready() -> None:
-    """Compile everything, or load it compiled, once a process: no planning step has to wait for it."""
-    posterior = model_hypotheses.prior(6.5e5, 465.0, 0.2, 0.15, 0.0)
-    limits = PlannerLimits(50e-6, 0.05, 4e-4, 1e3, 0.1)
-    part, place = np.array([20.0, 9.81]), np.array([0.0, 1.0])
-    lookahead = build_lookahead(limits, posterior, part, place)
-    value = lookahead.outlook.value(limits, 1.0, 2e-3)
-    space = limits.space(posterior, part, lookahead.strokes)
-    select_action(
-        2e-3, lookahead.table, value, space,
-        parameter_scenarios(posterior, Z, part, place), Goal(50e-6, 100.0), 0.1,
-    )  # fmt: skip
-    tap = Tap(0.02, 2e-4)
-    model_of_tap(tap, posterior, part)
-    largest_force(tap.velocity_m_s, tap.stroke_m, stiffest(posterior), 20.0, 9.81)
