@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from impactcell.errors import PositioningError
+from impactcell.errors import PositioningError, SettingsError
 from impactcell.journal.audit_entries import AuditEntry
+from impactcell.settings import read_cell
 from tests.integration.processes import simulator, told, write_cell
 from tests.integration.watched import Watched, serving
 from tests.patience import COMPILING_S
@@ -62,9 +63,8 @@ async def test_what_is_refused_commands_nothing(tmp_path: Path) -> None:
             assert "beyond the travel" in await refused(watched, -0.001)
             assert "position in mm" in await refused(watched, float("nan"))
         fine = {**CELL, "positioning": {"tolerance_um": 0.5, "travel_mm": 40.0}}
-        async with serving(write_cell(tmp_path, module["port"], **fine)) as watched:
-            await watched.connected("press-1")
-            assert "finer than the encoder" in await refused(watched, 0.005)
+        with pytest.raises(SettingsError, match=r"finer than encoder_resolution_um 1: raise it"):
+            read_cell(write_cell(tmp_path, module["port"], **fine))
         plain = {"positioning": None, "actuator": {"stroke_mm": None}}
         async with serving(write_cell(tmp_path, module["port"], **plain)) as watched:
             assert "has no positioning" in await refused(watched, 0.005)
