@@ -168,8 +168,8 @@ class TapPlanner:
         distance = abs(remaining_m)
         if self._is_stuck(remaining_m):
             return Unreachable(
-                f"{distance * 1e6:.1f} µm remain, {MOST_STILL} taps in a row have moved nothing, and any that "
-                f"moves more overshoots with a probability above {self.overshoot_probability:.2g}"
+                f"{distance * 1e6:.1f} µm remain, {MOST_STILL} taps in a row have moved nothing, and any "
+                f"that moves more overshoots with a probability above {self.overshoot_probability:.2g}"
             )
         part = self._part(mass_kg)
         place = np.array([position_m, math.copysign(1.0, remaining_m)])
