@@ -20,6 +20,7 @@ from tests.between_workers import share_in
 
 TESTS = Path(__file__).resolve().parent
 SHARED = TESTS.parents[1] / "shared" / "data"
+LOG_LEVELS = {name: logging.getLogger(name).level for name in ("", "impactcell", "simulator")}
 
 # The same examples in every run, and no example fails because the machine was busy. Hypothesis also draws
 # constants from the modules imported so far, and which those are depends on what a worker has run before:
@@ -116,13 +117,13 @@ def shared_data() -> Path:
 
 
 @pytest.fixture(autouse=True)
-def same_log_level() -> Iterator[None]:
-    """Give every test the log level that the first one had: `-q` of one must not silence the next."""
-    loggers = [logging.getLogger(name) for name in ("", "impactcell", "simulator")]
-    before = [logger.level for logger in loggers]
-    yield
-    for logger, level in zip(loggers, before, strict=True):
-        logger.setLevel(level)
+def same_log_level() -> None:
+    """Give every test the log level of the beginning, whatever a test or a fixture of a module has set.
+
+    `-q` of one must not silence the next, nor a verb that ran in one make the next say what it did.
+    """
+    for name, level in LOG_LEVELS.items():
+        logging.getLogger(name).setLevel(level)
 
 
 @pytest_asyncio.fixture
