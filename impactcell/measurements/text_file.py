@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from impactcell.errors import MeasurementError
-from impactcell.measurements.dialect import Dialect, decode, detect, later_lines, split_cells
+from impactcell.measurements.dialect import DELIMITERS, Dialect, decode, detect, later_lines, split_cells
 from impactcell.measurements.faults import MAX_FAULTS_TOLD
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.numbers import parse_number
@@ -64,7 +64,6 @@ def _lines(text: str, source: str, limits: Limits) -> list[str]:
     return lines
 
 
-_SEPARATORS = ";,\t|"
 _OPENS = re.compile(r'(?:^|[,;|\t])\s*"')
 """A cell that begins with a quote; one within a cell, as the inch of `Weg ["]`, is a sign like any other."""
 
@@ -94,7 +93,8 @@ def _separators_of_row(lines: list[str]) -> tuple[str, int]:
     sample = later_lines(lines)
     commonest = {
         sign: Counter(line.count(sign) for line in sample if sign in line).most_common(1)
-        for sign in _SEPARATORS
+        for sign in DELIMITERS
+        if sign != " "
     }
     often = {sign: counts[0] for sign, counts in commonest.items() if counts}
     if not often:
