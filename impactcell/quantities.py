@@ -146,6 +146,11 @@ CYCLE: Final[tuple[Quantity[Snapshot], ...]] = (
     _Q("Wear/CyclesToLimitHigh", 6044, "Upper end of the 95 % interval of CyclesToLimit.",
        ("Cycles left, at most (95 %)", "Zyklen übrig, höchstens (95 %)"),
        lambda s: s.wear.cycles_to_limit_high, _wear_quality, ONE, _up_to(1e9)),
+    _Q("Wear/LevelCommonStdDev", 6103,
+       "One standard deviation of what may be wrong in Level alike in all cycles, beside LevelStdDev.",
+       ("Level: error that all cycles share (95 %)", "Niveau: gemeinsamer Fehler aller Zyklen (95 %)"),
+       lambda s: s.wear.level_common_std, _wear_quality, ONE, _friction_range,
+       column="wear_level_common_std", quality_column="wear_quality"),
 
     _Q("Batch/BatchId", 6047, "Name of the present batch.",
        ("Batch", "Charge"),

@@ -229,6 +229,7 @@ class _DemoRun:
             "wear": {
                 "level": _number(last.wear.level),
                 "level_std": _number(last.wear.level_std),
+                "level_common_std": _number(last.wear.level_common_std),
                 "rate_per_1000_cycles": _number(last.wear.rate_per_cycle * 1000),
                 "limit": _number(last.wear.limit),
                 "cycles_to_limit": _number(last.wear.cycles_to_limit),

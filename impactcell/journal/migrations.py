@@ -262,7 +262,18 @@ STATE_MIGRATIONS: Final = (
         },
     ),
     Migration(added={"cell.tracker.rates": run_length_bank.EMPTY, "cell.tracker.rate_change": None}),
+    Migration(
+        added={
+            "cell.tracker.common_variance": math.nan,
+            "cell.tracker.common_cycles": 0.0,
+            "snapshot.wear.level_common_std": math.nan,
+            **{
+                f"snapshot.friction.{which}.common_std": math.nan
+                for which in ("mu_s", "mu_k", "by_force", "by_distance", "combined")
+            },
+        }
+    ),
 )
-"""Of a cell's state: to format 2, 3, 4, 5, 6, 7 and 8. What earlier planners had not counted is nothing."""
+"""Of a cell's state: to formats 2 to 9. What earlier planners had not counted is nothing."""
 ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)
 MODEL_MIGRATIONS: Final = (Migration(_model_2, renamed=_MODEL_2_RENAMED),)

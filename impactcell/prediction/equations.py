@@ -41,8 +41,9 @@ def by_force(
         )
     sensitivity = _sensitivity(mixed, lambda predictor: predictor.force_sensitivity)
     rms = mixed.mean(lambda predictor: predictor.force.rms)
-    std = math.hypot(peak.std / slope, rms, value * _relative_calibration_std(model, sensitivity))
-    return _graded(model, mixed, velocity_m_s, value, std)
+    calibration_std = value * _relative_calibration_std(model, sensitivity)
+    stds = math.hypot(peak.std / slope, rms, calibration_std), math.hypot(rms, calibration_std)
+    return _graded(model, mixed, velocity_m_s, value, *stds)
 
 
 def by_distance(
@@ -81,9 +82,9 @@ def by_distance(
     slope = abs(mixed.slope_of_distance(value, velocity_m_s))
     sensitivity = _sensitivity(mixed, lambda predictor: predictor.distance_sensitivity)
     rms = mixed.mean(lambda predictor: predictor.distance.rms)
-    relative_std = _relative_calibration_std(model, sensitivity)
-    std = math.hypot(slide.std / max(slope, 1e-12), rms, value * relative_std)
-    return _graded(model, mixed, velocity_m_s, value, std)
+    calibration_std = value * _relative_calibration_std(model, sensitivity)
+    std = math.hypot(slide.std / max(slope, 1e-12), rms, calibration_std)
+    return _graded(model, mixed, velocity_m_s, value, std, math.hypot(rms, calibration_std))
 
 
 def combined(
@@ -113,13 +114,18 @@ def combined(
         weight * of_force.ratio + distance_weight * of_distance.ratio,
     )
     slope = abs(mixed.slope_of_distance(mu_dist.value, velocity_m_s))
-    stds = (
-        math.hypot(peak.std / mixed.friction_n, mixed.mean(lambda predictor: predictor.force.rms)),
-        math.hypot(distance.std / max(slope, 1e-12), mixed.mean(lambda predictor: predictor.distance.rms)),
+    forms = (
+        mixed.mean(lambda predictor: predictor.force.rms),
+        mixed.mean(lambda predictor: predictor.distance.rms),
     )
-    relative_std = _relative_calibration_std(model, sensitivity)
-    std = math.hypot(weight * stds[0], distance_weight * stds[1], value * relative_std)
-    found = _graded(model, mixed, velocity_m_s, value, std)
+    stds = (
+        math.hypot(peak.std / mixed.friction_n, forms[0]),
+        math.hypot(distance.std / max(slope, 1e-12), forms[1]),
+    )
+    calibration_std = value * _relative_calibration_std(model, sensitivity)
+    std = math.hypot(weight * stds[0], distance_weight * stds[1], calibration_std)
+    common_std = math.hypot(weight * forms[0], distance_weight * forms[1], calibration_std)
+    found = _graded(model, mixed, velocity_m_s, value, std, common_std)
     between = Sensitivity(
         of_force.stiffness - of_distance.stiffness,
         of_force.damping - of_distance.damping,
@@ -201,10 +207,10 @@ def beyond_calibration(model: Model, capture: Capture, mu_s: float) -> str:
 
 
 def _graded(
-    model: Model, mixed: MassInterpolation, velocity_m_s: float, value: float, std: float
+    model: Model, mixed: MassInterpolation, velocity_m_s: float, value: float, std: float, common_std: float
 ) -> Coefficient:
     reason = out_of_range(model, mixed, velocity_m_s, value, model.stroke_m)
-    return Coefficient(value, std, Quality.UNCERTAIN if reason else Quality.GOOD, reason)
+    return Coefficient(value, std, Quality.UNCERTAIN if reason else Quality.GOOD, reason, common_std)
 
 
 def _relative_calibration_std(model: Model, sensitivity: Sensitivity) -> float:

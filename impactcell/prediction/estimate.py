@@ -1,7 +1,7 @@
 """One capture in, one `FrictionEstimate` out: every predictor, and the one that is published."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from impactcell.errors import NotConvergedError, PredictionError
 from impactcell.features import Fault, Features, MeasuredFeature, SlideFeatures, extract
@@ -134,8 +134,8 @@ def _from_waveform(
         )
     at_once = waveform.immediate > 0.5
     reason = "mu_s through mu_k/mu_s of the model: the part moved at once" if at_once else ""
-    mu_s = Coefficient(waveform.mu_s, waveform.mu_s_std, Quality.GOOD, reason)
-    mu_k = Coefficient(waveform.mu_k, waveform.mu_k_std, Quality.GOOD)
+    mu_s = Coefficient(waveform.mu_s, waveform.mu_s_std, Quality.GOOD, reason, waveform.mu_s_common_std)
+    mu_k = Coefficient(waveform.mu_k, waveform.mu_k_std, Quality.GOOD, "", waveform.mu_k_common_std)
     return _with_warnings(mu_s, *warnings), _with_warnings(mu_k, *warnings), waveform.gap
 
 
@@ -204,9 +204,8 @@ def _with_warnings(coefficient: Coefficient, *warnings: str) -> Coefficient:
     if not texts:
         return coefficient
     reasons = dict.fromkeys([*filter(None, coefficient.reason.split("; ")), *"; ".join(texts).split("; ")])
-    return Coefficient(
-        coefficient.value, coefficient.std, max(coefficient.quality, Quality.UNCERTAIN), "; ".join(reasons)
-    )
+    quality = max(coefficient.quality, Quality.UNCERTAIN)
+    return replace(coefficient, quality=quality, reason="; ".join(reasons))
 
 
 def _select_published(capture: Capture, equations: _Equations) -> tuple[Coefficient, Estimator]:

@@ -74,6 +74,21 @@ class Posterior:
         second = self.weights @ (np.array(variances) + (np.array(means) - mean) ** 2)
         return mean, math.sqrt(float(second))
 
+    def shared_std(self, of: Samples, shared: Samples) -> float:
+        """Give the part of the standard deviation of `of` @ theta that is of wrong priors, not of noise.
+
+        In least squares with covariance C and a prior of precision P an error e of the prior's mean moves the
+        estimate by C P e. With e as wide as the prior that is C P C; the rest, C - C P C, is the noise's.
+
+        Parameters
+        ----------
+        of : ndarray, shape (p,)
+        shared : ndarray, shape (p,)
+            One over the standard deviation of each prior that other taps have as well; 0 for all else.
+        """
+        along = [shared * (side.covariance @ of) for side in self.sides]
+        return math.sqrt(sum(w * float(one @ one) for w, one in zip(self.weights, along, strict=True)))
+
     def _along(self, side: TruncatedGaussian, of: Samples) -> tuple[float, float, float]:
         """Mean and spread of z on one side, and how the linear form follows z."""
         centre = float(self.form @ side.mean) + self.offset

@@ -19,6 +19,7 @@ from impactcell.physics import Plant
 from impactcell.prediction.capture_blocks import linearised_model, recorder_std_of
 from impactcell.prediction.linearised_model import (
     MU_K,
+    ONSET,
     PARAMETERS,
     LinearisedModel,
     parameter_count,
@@ -54,6 +55,9 @@ class WaveformFit:
     ----------
     mu_s, mu_s_std, mu_k, mu_k_std : float
         Posterior means and standard deviations.
+    mu_s_common_std, mu_k_common_std : float
+        The part of these that taps like this one share: errors of the plant's constants, of mass, velocity
+        and scale as told; first contact is each tap's own.
     theta : ndarray, shape (4,) or (8,)
         Most probable ln(mu_k, mu_k/mu_s, k, b), and of a tap that was measured its first contact, mass,
         velocity and scale of the force, in standard deviations from what is known of them.
@@ -72,6 +76,8 @@ class WaveformFit:
     mu_s_std: float
     mu_k: float
     mu_k_std: float
+    mu_s_common_std: float
+    mu_k_common_std: float
     theta: Samples
     posterior: Posterior
     immediate: float
@@ -160,11 +166,16 @@ def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples)
     posterior = mixture(sides, kink_form, offset)
     slips_at_once = [minimum.side < 0 for minimum in fits]
     (mu_s, mu_s_std), (mu_k, mu_k_std) = (_log_normal_moments(posterior, of) for of in (MU_S_FORM, MU_K_FORM))
+    shared = prior.weight.copy()
+    shared[ONSET : ONSET + 1] = 0.0
+    in_mu_s, in_mu_k = (posterior.shared_std(_over(of, len(shared)), shared) for of in (MU_S_FORM, MU_K_FORM))
     return WaveformFit(
         mu_s=mu_s,
         mu_s_std=mu_s_std,
         mu_k=mu_k,
         mu_k_std=mu_k_std,
+        mu_s_common_std=min(mu_s * in_mu_s, mu_s_std),
+        mu_k_common_std=min(mu_k * in_mu_k, mu_k_std),
         theta=best.theta,
         posterior=posterior,
         immediate=float(posterior.weights[slips_at_once].sum()),

@@ -29,12 +29,20 @@ class Estimator(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Coefficient:
-    """A friction coefficient with one standard deviation; nan in both where there is none."""
+    """A friction coefficient with one standard deviation; nan in both where there is none.
+
+    Attributes
+    ----------
+    common_std : float
+        Part of `std` that taps like this one share, as an error of the model's mu_k/mu_s or of the force's
+        scale: the mean of many taps is no better than that. nan where it is not known.
+    """
 
     value: float = float("nan")
     std: float = float("nan")
     quality: Quality = Quality.BAD
     reason: str = ""
+    common_std: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +79,14 @@ class WearState:
     """Friction followed over time: `level` is mu_s at the reference batch, `rate` its change per cycle.
 
     Standard deviations here come from how the estimates scatter. What all estimates of a cell share, such as
-    an error of mass, of the force's scale or of the prior on mu_k/mu_s, moves the level as a whole and is in
-    the standard deviation of each cycle's estimate only: changes are known better than the level itself.
+    an error of mass, of the force's scale or of the prior on mu_k/mu_s, moves the level as a whole: changes
+    are known better than the level itself. Probability and cycles to the limit are those of the level as the
+    cell measures it, for a limit that was set by what the cell shows.
+
+    Attributes
+    ----------
+    level_common_std : float
+        Standard deviation of what all estimates share, beside `level_std`; nan where it is not known.
     """
 
     level: float
@@ -86,6 +100,7 @@ class WearState:
     cycles_to_limit_high: float
     quality: Quality
     reason: str = ""
+    level_common_std: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True)

@@ -83,6 +83,10 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
     ),
     "Number of the last cycle, as the module counts.": "Nummer des letzten Zyklus, wie das Modul zählt.",
     "One standard deviation of Level.": "Eine Standardabweichung des Niveaus.",
+    "One standard deviation of what may be wrong in Level alike in all cycles, beside LevelStdDev.": (
+        "Eine Standardabweichung dessen, was am Niveau in allen Zyklen gleich falsch sein kann, "
+        "neben LevelStdDev."
+    ),
     "One standard deviation of Offset.": "Eine Standardabweichung des Abstands.",
     "One standard deviation of Size.": "Eine Standardabweichung der Größe.",
     "One standard deviation of StaticFriction.": "Eine Standardabweichung der Haftreibung.",

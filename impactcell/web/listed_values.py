@@ -15,7 +15,8 @@ STD_SUFFIX = "StdDev"
 class ListedValue:
     """A published value on the page.
 
-    `form` is `coefficient`, `count`, `cycle` (0: none), `cycles` (whole ones), or empty.
+    `form` is `coefficient`, `count`, `cycle` (0: none), `cycles` (whole ones), `band` (what is told of a
+    standard deviation that stands by itself), or empty.
     """
 
     path: str
@@ -47,6 +48,8 @@ def listed_values(language: str) -> dict[str, list[ListedValue]]:
 def _form(quantity: Quantity[Any]) -> str:
     if quantity.data_type is DataType.UINT32:
         return "cycle" if quantity.path.endswith("Cycle") else "count"
+    if quantity.path.endswith(STD_SUFFIX):
+        return "band"
     if quantity.path.startswith("Wear/CyclesToLimit"):
         return "cycles"
     bounds = quantity.node_range(Ranges())

@@ -43,6 +43,19 @@ def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
     return RuleResult(NAME, holds=True, message=message, evidence=evidence)
 
 
+def told_level(wear: WearState) -> tuple[str, str]:
+    """Write the level and its band in both languages, and what all cycles share where that is more."""
+    band = f"{plus_minus(wear.level, wear.level_std, '.4f')} (95 %)"
+    band_in_german = f"{german(wear.level, '.4f', wear.level_std)} (95 %)"
+    if not wear.level_common_std > wear.level_std:
+        return band, band_in_german
+    common = TOLD_STDS * wear.level_common_std
+    return (
+        f"{band[:-1]}; ± {common:.4f} more, alike in all cycles)",
+        f"{band_in_german[:-1]}; dazu ± {german(common, '.4f')}, in allen Zyklen gleich)",
+    )
+
+
 def _is_rising(wear: WearState) -> bool:
     return wear.rate_per_cycle > TOLD_STDS * wear.rate_std
 
@@ -56,6 +69,7 @@ def _passed(wear: WearState, cycle: int, above: float) -> int:
 def _message(wear: WearState, evidence: Evidence, cycle: int, *, active: bool) -> Message:
     since, reach = evidence.change_cycle, TOLD_STDS * wear.level_std
     sure, sure_in_german = percent_sure(evidence.statistic)
+    level, level_in_german = told_level(wear)
     doubt, doubt_in_german = DOUBT if wear.quality is Quality.UNCERTAIN else ("", "")
     if active:
         when, when_in_german = (
@@ -69,9 +83,9 @@ def _message(wear: WearState, evidence: Evidence, cycle: int, *, active: bool) -
     else:
         when, when_in_german = "is passed (", "überschritten ("
     return Message(
-        f"The surface is worn: friction is {plus_minus(wear.level, wear.level_std, '.4f')} (95 %), "
+        f"The surface is worn: friction is {level}, "
         f"its limit {wear.limit:.4f} {when}{sure} % sure). {doubt}Renew the surface, then reset wear.",
-        f"Die Oberfläche ist verschlissen: Reibung {german(wear.level, '.4f', wear.level_std)} (95 %), "
+        f"Die Oberfläche ist verschlissen: Reibung {level_in_german}, "
         f"Grenze {german(wear.limit, '.4f')} {when_in_german}{sure_in_german} % sicher). "
         f"{doubt_in_german}Oberfläche erneuern, danach Verschleiß zurücksetzen.",
     )

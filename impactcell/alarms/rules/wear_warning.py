@@ -20,7 +20,6 @@ from impactcell.alarms.rule import (
 )
 from impactcell.alarms.rules import wear_limit
 from impactcell.records import Evidence, WearState
-from impactcell.records.uncertainty import plus_minus
 
 NAME = "WearWarning"
 """Published name."""
@@ -43,16 +42,16 @@ def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
 def _message(wear: WearState, probability: float, horizon: float) -> Message:
     rate = 1000.0 * wear.rate_per_cycle
     sure, sure_in_german = percent_sure(probability)
+    level, level_in_german = wear_limit.told_level(wear)
     english, german_words = (_cycles(wear, words) for words in (("to", "or more"), ("bis", "oder mehr")))
     return Message(
-        f"The surface will be worn soon: friction is {plus_minus(wear.level, wear.level_std, '.4f')} "
-        f"(95 %) and rises by {rate:.4f} per 1000 cycles; about {english} cycles are left to its limit "
-        f"{wear.limit:.4f}. It is {sure} % sure to be passed within {horizon:.0f} cycles. "
-        "Plan to renew the surface.",
-        f"Die Oberfläche ist bald verschlissen: Reibung {german(wear.level, '.4f', wear.level_std)} "
-        f"(95 %), sie steigt um {german(rate, '.4f')} je 1000 Zyklen; bis zur Grenze "
-        f"{german(wear.limit, '.4f')} bleiben etwa {german_words} Zyklen. Zu {sure_in_german} % wird sie "
-        f"innerhalb von {horizon:.0f} Zyklen überschritten. Erneuern der Oberfläche einplanen.",
+        f"The surface will be worn soon: friction is {level} and rises by {rate:.4f} per 1000 cycles; "
+        f"about {english} cycles are left to its limit {wear.limit:.4f}. It is {sure} % sure to be passed "
+        f"within {horizon:.0f} cycles. Plan to renew the surface.",
+        f"Die Oberfläche ist bald verschlissen: Reibung {level_in_german}, sie steigt "
+        f"um {german(rate, '.4f')} je 1000 Zyklen; bis zur Grenze {german(wear.limit, '.4f')} bleiben etwa "
+        f"{german_words} Zyklen. Zu {sure_in_german} % wird sie innerhalb von {horizon:.0f} Zyklen "
+        "überschritten. Erneuern der Oberfläche einplanen.",
     )
 
 

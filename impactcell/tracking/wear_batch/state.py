@@ -33,6 +33,8 @@ class FrictionObservation:
         The module's; another one than before counts its cycles anew. 0 where it is not known.
     doubt : str
         Why mu_s is uncertain; empty where it is not.
+    common_std : float
+        Part of mu_s_std that other cycles share; nan where it is not known.
     """
 
     cycle: int
@@ -43,6 +45,7 @@ class FrictionObservation:
     expected_change: bool = False
     session: int = 0
     doubt: str = ""
+    common_std: float = math.nan
 
     @classmethod
     def of(
@@ -52,7 +55,15 @@ class FrictionObservation:
         mu_s = estimate.mu_s
         doubt = mu_s.reason if mu_s.quality is Quality.UNCERTAIN else ""
         return cls(
-            capture.cycle, mu_s.value, mu_s.std, capture.time_ns, batch_id, expected, capture.session, doubt
+            capture.cycle,
+            mu_s.value,
+            mu_s.std,
+            capture.time_ns,
+            batch_id,
+            expected,
+            capture.session,
+            doubt,
+            mu_s.common_std,
         )
 
 
@@ -156,6 +167,8 @@ class TrackerState:
         until the next cycle after a change of rate.
     wear_blocks : WearBlocks or None
         What all cycles say of wear where nobody says of which batch they are; None while the filter does.
+    common_variance, common_cycles : float
+        Of what the estimates of the reference batch share, the mean, and the cycles that it is of.
     """
 
     clock: CycleClock = field(default_factory=CycleClock)
@@ -180,6 +193,8 @@ class TrackerState:
     level_variance: float = 0.0
     slope_variance: float = 0.0
     wear_blocks: WearBlocks | None = None
+    common_variance: float = math.nan
+    common_cycles: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -96,6 +96,7 @@ def tracking_result(
         Quality.UNCERTAIN if doubts else quality,
         "; ".join(doubts),
         probability,
+        math.sqrt(state.common_variance),
     )
     change = state.change_point
     not_ready = batch_change_detection.reason_not_ready(state)

@@ -37,6 +37,8 @@ SHORTEST_BATCH = 4.0
 """Mean cycles a batch id must last to say anything about batches."""
 JUDGED_BATCHES = 10
 """Batch ids after which their mean length is judged."""
+COMMON_CYCLES = 100.0
+"""Cycles over which what estimates share is averaged: velocities alternate, and a cell may be set anew."""
 
 
 def update(
@@ -110,6 +112,7 @@ def update(
         change_point=batch_change_detection.refined_change_point(state, updated.bank),
         wear_blocks=batch_filter.update_blocks(settings, state, cycle, updated),
     )
+    state = _follow_common_error(state, cycle)
     if state.commissioning is not None and timing.lag == 0:
         state = process_noise.commission(settings, state, cycle, state.commissioning)
     is_expected = announced > 0.0 and observation.expected_change
@@ -151,7 +154,21 @@ def _first_state(settings: TrackerSettings, state: TrackerState, cycle: UsableCy
         commissioning=noise_identification.append_cycle(
             noise_identification.CommissioningRecord(), cycle, batch
         ),
+        common_variance=observation.common_std**2,
+        common_cycles=1.0,
     )
+
+
+def _follow_common_error(state: TrackerState, cycle: UsableCycle) -> TrackerState:
+    """Average what estimates share while they are of the reference batch: later ones tell of an offset."""
+    variance = cycle.observation.common_std**2
+    if math.isnan(variance) or state.accepted != state.first_index or cycle.timing.lag > 0:
+        return state
+    if math.isnan(state.common_variance):
+        return replace(state, common_variance=variance, common_cycles=1.0)
+    cycles = min(state.common_cycles + 1.0, COMMON_CYCLES)
+    mean = state.common_variance + (variance - state.common_variance) / cycles
+    return replace(state, common_variance=mean, common_cycles=cycles)
 
 
 def _is_other_batch(settings: TrackerSettings, state: TrackerState, observation: FrictionObservation) -> bool:

@@ -96,6 +96,7 @@ def forecast(
     quality: Quality = Quality.GOOD,
     reason: str = "",
     probability_above: float | None = None,
+    common_std: float = math.nan,
 ) -> WearState:
     """Say how level and slope stand to the limit.
 
@@ -105,6 +106,8 @@ def forecast(
         Process variances of level and slope a cycle: they widen what is to come.
     probability_above : float, optional
         That the level is above the limit, where a normal distribution is not all that is known of it.
+    common_std : float
+        Of what all estimates share: it is told beside the level and is in nothing else.
     """
     level_variance, slope_variance = max(moments.level_variance, 0.0), max(moments.slope_variance, 0.0)
     std, excess = math.sqrt(level_variance), moments.level - limit
@@ -126,6 +129,7 @@ def forecast(
         high,
         quality,
         reason,
+        common_std,
     )
 
 

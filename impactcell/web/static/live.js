@@ -42,6 +42,7 @@ export function showValues(root, card) {
     if (typeof value === "boolean") text = value ? texts.yes : texts.no;
     else if (typeof value === "string") text = value || "–";
     else if (std !== null && Number.isFinite(value)) text = [beside(std, value), toldStd(std), unit].filter(Boolean).join(" ");
+    else if (form === "band") text = Number.isFinite(value) ? toldStd(value) : "–";
     else if (form === "coefficient") text = coefficient(value);
     else if (form === "cycle") text = value ? number(value, 10) : "–";
     else if (form === "cycles") text = wholeCycles(value);

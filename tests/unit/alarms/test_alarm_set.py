@@ -208,6 +208,17 @@ def test_every_message_tells_two_standard_deviations():
     assert "at about cycle 1500 (1300 to 1700;" in judge(SETTINGS, NORMAL, at, WEAR).message.english
 
 
+def test_a_message_of_wear_tells_what_all_cycles_share_where_that_is_more():
+    at = CycleInputs(2000, wear(0.99), probability_at_horizon=0.95, horizon=5000.0)
+    for name in (WEAR, WARNING):
+        shared = replace(at, wear=replace(at.wear, level_common_std=0.004))
+        message = judge(SETTINGS, NORMAL, shared, name).message
+        assert "0.2100 ± 0.0020 (95 %; ± 0.0080 more, alike in all cycles)" in message.english
+        assert "0,2100 ± 0,0020 (95 %; dazu ± 0,0080, in allen Zyklen gleich)" in message.german
+        less = replace(at, wear=replace(at.wear, level_common_std=0.0005))
+        assert judge(SETTINGS, NORMAL, less, name) == judge(SETTINGS, NORMAL, at, name)
+
+
 def test_when_the_limit_was_passed_is_not_told_anew_by_the_rate_of_now():
     """A surface that has run in does not rise any more: by that it was never at its limit."""
     worn = wear(0.99)

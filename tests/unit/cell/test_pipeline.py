@@ -78,3 +78,18 @@ def test_contact_between_two_samples_of_a_module_bends_no_friction() -> None:
             pulls.append((found.value - mu_s) / found.std)
     assert len(pulls) > 12
     assert float(np.abs(pulls).max()) < 4.0
+
+
+def test_a_level_of_a_wrong_model_is_known_no_better_than_what_its_taps_share() -> None:
+    """mu_k/mu_s is 3 % below the model's: the average of 60 taps is off by far more than it scatters."""
+    design = cell_design(read_cell(CONFIG / "cells" / "prototype.yaml"))
+    state, draw = core.initial_state(design), np.random.default_rng(4)
+    for cycle in range(1, 61):
+        tap = Tap(0.05, 0.2, ratio=0.97 * design.model.ratio, stroke_m=1.5e-3)
+        stepped = core.step(design, state, tap.capture(draw, cycle=cycle), PositioningState(), None, ())
+        state = stepped.state
+    wear = stepped.snapshot.wear
+    off = abs(wear.level - 0.2)
+    assert off > 4.0 * wear.level_std
+    assert off < 2.5 * np.hypot(wear.level_std, wear.level_common_std)
+    assert wear.level_common_std < stepped.snapshot.friction.mu_s.std * 1.01

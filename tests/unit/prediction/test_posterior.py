@@ -92,3 +92,20 @@ def test_doubt_leaves_noise_alone_and_widens_what_is_missed() -> None:
     factor = std_factors(residual, phase)
     assert (factor[50:100] > 15.0).all()
     assert (np.delete(factor, slice(50, 100)) == 1.0).all()
+
+
+def test_what_other_taps_share_is_what_a_wrong_prior_does_to_the_estimate() -> None:
+    """Least squares solved by numpy for many draws of the prior's error: noise apart, what they spread by."""
+    rng, of = np.random.default_rng(3), np.array([1.0, -0.5, 0.0])
+    slopes, precision = rng.normal(size=(12, 3)), np.array([0.0, 4.0, 2.0])
+    covariance = np.linalg.inv(slopes.T @ slopes + np.diag(precision**2))
+    posterior = mixture((TruncatedGaussian(np.zeros(3), covariance, 0.0, 0.0, 0),), np.zeros(3), 0.0)
+    rows = np.vstack([slopes, np.diag(precision)[1:]])
+    for shared, drawn in ((precision, [1.0, 1.0]), (np.array([0.0, 4.0, 0.0]), [1.0, 0.0])):
+        found = [
+            np.linalg.lstsq(rows, np.concatenate([np.zeros(12), error * drawn]), rcond=None)[0] @ of
+            for error in rng.normal(size=(4000, 2))
+        ]
+        assert posterior.shared_std(of, shared) == pytest.approx(np.std(found), rel=0.05)
+    assert posterior.shared_std(of, precision) < posterior.moments(of)[1]
+    assert posterior.shared_std(of, np.zeros(3)) == 0.0

@@ -61,3 +61,9 @@ def test_only_what_has_changed_is_said_to_have() -> None:
     object.__setattr__(later, "alarms", first.alarms)  # as a cycle in which no alarm moves
     assert view.take(CellNews("press-1", later)) == {"card", "detail"}
     assert view.take(CellNews("press-1", status=view.status)) == set()
+
+
+def test_a_standard_deviation_without_a_value_of_its_own_is_shown_as_a_band() -> None:
+    forms = {value.path: value.form for folder in listed_values("de").values() for value in folder}
+    assert forms["Wear/LevelCommonStdDev"] == "band"
+    assert "Wear/LevelStdDev" not in forms

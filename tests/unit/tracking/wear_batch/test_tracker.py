@@ -311,3 +311,32 @@ def test_a_change_among_the_first_cycles_leaves_the_level_that_of_the_cycles_bef
     assert np.sqrt(np.mean(off**2)) < 1.8
     for last in lasts:
         assert abs(last.batch.offset - 4.0 * STD) < 3.5 * last.batch.offset_std
+
+
+def test_what_all_estimates_share_stands_beside_the_level_and_moves_nothing_else():
+    plain = series(60, step=8.0, at=40)
+    shared = [replace(reading, common_std=0.003 + 0.002 * (reading.cycle % 2)) for reading in plain]
+    without, outcomes = run(UNKNOWN, plain), run(UNKNOWN, shared)
+    mean = math.sqrt(0.5 * (0.003**2 + 0.005**2))
+    assert math.isnan(without[-1].wear.level_common_std)
+    assert outcomes[39].wear.level_common_std == pytest.approx(mean)
+    for one, other in zip(outcomes, without, strict=True):
+        assert replace(one.wear, level_common_std=0.0) == replace(other.wear, level_common_std=0.0)
+    late = [replace(one, cycle=one.cycle + 60, common_std=0.1) for one in series(20, step=8.0)]
+    after = run(UNKNOWN, late, outcomes[-1].state)[-1].wear
+    assert any(one.shift for one in outcomes), (
+        "another batch tells of its offset, not of the reference's level"
+    )
+    assert after.level_common_std == pytest.approx(mean, rel=0.05)
+
+
+def test_what_estimates_share_is_learned_anew_with_the_level_and_kept_over_unusable_cycles():
+    shared = [replace(reading, common_std=0.003) for reading in series(30)]
+    state = run(KNOWN, shared)[-1].state
+    unusable = wear_batch.update(KNOWN, state, FrictionObservation(30, math.nan, math.nan, 31 * SECOND))
+    assert unusable.wear.level_common_std == pytest.approx(0.003)
+    untold = wear_batch.update(KNOWN, state, replace(shared[0], cycle=30, common_std=math.nan))
+    assert untold.wear.level_common_std == pytest.approx(0.003)
+    fresh = wear_batch.reset_wear_level(state)
+    renewed = wear_batch.update(KNOWN, fresh, replace(shared[0], cycle=31, common_std=0.001))
+    assert renewed.wear.level_common_std == pytest.approx(0.001)
