@@ -95,11 +95,7 @@ def loss_of_contact(force: CheckedForce) -> MeasuredFeature:
     if highest < MIN_CONTACT_STD * sigma:
         raise CaptureError(f"no contact: the force stays below {highest:.3g} N, noise is {sigma:.3g} N")
     width = smoothing_width(force)
-    threshold = max(THRESHOLD_STD * sigma / math.sqrt(width), THRESHOLD_SHARE * highest)
-    idle = float(np.abs(smooth[-max(len(smooth) // IDLE_PART, 1) :]).max())
-    unsure = sigma
-    if threshold < idle < MAX_IDLE_SHARE * highest:
-        threshold, unsure = IDLE_FACTOR * idle, sigma + idle
+    threshold, unsure = _contact_threshold(force, width, highest)
     last = len(smooth) - 1 - int((smooth[::-1] > threshold).argmax())
     if last >= len(smooth) - max(2, width):
         raise NoSeparationError(f"the force was still {smooth[-1]:.3g} N when its record ended")
@@ -125,6 +121,28 @@ def loss_of_contact(force: CheckedForce) -> MeasuredFeature:
     near = times[max(0, last - 50) : last + 2]
     step = median(near[1:] - near[:-1])
     return MeasuredFeature(float(times[last] + 0.5 * step * width), step * width)
+
+
+def contact_spells(force: CheckedForce) -> list[tuple[float, float]]:
+    """Give the first and last time of each contact, s: of several where the actuator meets the part again."""
+    times, smooth = force.time_s, force.smooth
+    width = smoothing_width(force)
+    threshold, _ = _contact_threshold(force, width, float(smooth.max()))
+    touches = np.concatenate([[0], smooth > threshold, [0]]).astype(np.int8)
+    turns = np.diff(touches)
+    begins, ends = np.flatnonzero(turns > 0), np.flatnonzero(turns < 0)
+    lasting = ends - begins > max(2, width)
+    return list(zip(times[begins[lasting]].tolist(), times[ends[lasting] - 1].tolist(), strict=True))
+
+
+def _contact_threshold(force: CheckedForce, width: int, highest: float) -> tuple[float, float]:
+    """Smoothed force above which there is contact, and how unsure a sample of it is, N."""
+    sigma, smooth = force.sigma, force.smooth
+    threshold = max(THRESHOLD_STD * sigma / math.sqrt(width), THRESHOLD_SHARE * highest)
+    idle = float(np.abs(smooth[-max(len(smooth) // IDLE_PART, 1) :]).max())
+    if threshold < idle < MAX_IDLE_SHARE * highest:
+        return IDLE_FACTOR * idle, sigma + idle
+    return threshold, sigma
 
 
 def _real_roots(c0: float, c1: float, c2: float) -> tuple[float, ...]:

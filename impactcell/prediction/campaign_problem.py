@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.errors import NotConvergedError
+from impactcell.errors import NotConvergedError, PhysicsError
 from impactcell.prediction import gauss_newton
 from impactcell.prediction.gauss_newton import Step, StopRule
 from impactcell.prediction.linearised_model import (
@@ -38,6 +38,10 @@ STOP = StopRule(max_steps=40, length=0.02, cost=0.05, refused_cost=0.1)
 """When the joint fit ends; its cost is of all taps, ten and more."""
 MAX_STEP = np.array([0.3, 0.3, 0.3, 4.0, 4.0, 4.0])
 """Longest step of what is shared: farther away the linear model says nothing."""
+HELD = 1e-6
+"""Standard deviation of ln(mu_k/mu_s) that holds it where it is."""
+LEAST_RISE = 2.0
+"""Rise of the sum of squares at two standard deviations, 4 where it is quadratic, below which it is flat."""
 NO_REST = (
     "the plant could not be fitted to the campaign: no k, b and mu_k/mu_s explain its taps; see that stroke, "
     "masses and t = 0, first contact, are right, or give --cell; `discrepancy` says what a model lacks"
@@ -76,6 +80,31 @@ class CampaignProblem:
         """Go from a guess to the minimum."""
         minimum, step, is_at_rest = gauss_newton.fit(self, initial_guess, STOP)
         return CampaignFit(minimum.theta, step.covariance, 2.0 * minimum.cost, is_at_rest)
+
+    def ratio_std(self, fitted: CampaignFit) -> float:
+        """Give the standard deviation of ln(mu_k/mu_s), as far as residuals really rise to either side.
+
+        A tap that moves at once shows nothing of mu_s: where few taps stick, and those only just, the
+        curvature is that of one side of a wall, and beyond the kink lies level ground (a profile likelihood,
+        as by Murphy and van der Vaart 2000).
+        """
+        std = float(np.sqrt(fitted.covariance[0, 0]))
+        return max(self._half_width(fitted, std), self._half_width(fitted, -std))
+
+    def _half_width(self, fitted: CampaignFit, std: float) -> float:
+        """Double a standard deviation until two of it make a difference, with all else fitted anew."""
+        while abs(std) < self.spread[0]:
+            moved = fitted.theta.copy()
+            moved[:, RATIO] += 2.0 * std
+            held = CampaignProblem(self.responses, moved[0, SHARED], np.append(HELD, self.spread[1:]))
+            try:
+                rise = held.fit(moved).chi2 - fitted.chi2
+            except PhysicsError:  # no part moves so
+                return abs(std)
+            if rise >= LEAST_RISE:
+                return abs(std)
+            std *= 2.0
+        return float(self.spread[0])
 
     def linearise(self, theta: Samples) -> CampaignPoint:
         """Linearise the model of every tap."""

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from impactcell.features import CheckedChannel, Features, required
+from impactcell.features.contact import contact_spells
 from impactcell.physics import Plant, TapEventKind, TapInput, simulate_tap
 from impactcell.prediction.block_averaging import (
     FINE_FORCE_BLOCK_S,
@@ -21,6 +22,12 @@ KINK_SPAN_S = 1.5e-4
 """How far to either side of an event of the start, s, blocks are short: the fit has its event there. With
 half of it, twice and four times the errors of mu_s are the same to 1e-3 of themselves."""
 
+JUMP_SPAN_S = 1e-4
+"""How far to either side of a jump of the force, s, where a part is met again, blocks say nothing: a few
+times how well it is known when that is. A sample that the jump crosses is off by a hundred times the noise,
+and its slope is that of a wall."""
+LEFT_OUT = 1e3
+"""Factor of the standard deviation of blocks that are left out of a fit."""
 AT_THE_HALT_S = 1e-9
 """A sample this near to the actuator's halt, s, is of before or after it by rounding alone: modules give
 times in whole ns."""
@@ -70,12 +77,26 @@ def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
     force = average_blocks(pressed, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
     jumps = [event.time_s for event in motion.events if event.kind is TapEventKind.CONTACT]
     if jumps or edges:
-        factors = _std_factors_at_jumps(force.time_s, jumps, 2.0 * FINE_FORCE_BLOCK_S)
+        factors = _std_factors_at_jumps(force.time_s, jumps, JUMP_SPAN_S)
         factors *= _std_factors_at_jumps(force.time_s, edges, AT_THE_HALT_S)
         force = replace(force, std=force.std * factors)
     moved = _surely_touching(required(features.position), onset_std_s)
     position = average_blocks(moved, POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
     return LinearisedModel(plant, tap, force, position, recorder_std)
+
+
+def until_next_contact(response: LinearisedModel, features: Features) -> LinearisedModel:
+    """Leave out all that comes after the part is met again; the model itself where it is not.
+
+    When it is met again depends on all before: by a rough start at some other time, or never, and from there
+    no step leads to where it was.
+    """
+    spells = contact_spells(required(features.force))
+    if len(spells) < 2:
+        return response
+    met_s, _ = spells[1]
+    times = np.concatenate([response.force_time_s, response.position_time_s])
+    return response.reweighted(np.where(times < met_s - JUMP_SPAN_S, 1.0, LEFT_OUT))
 
 
 def _surely_touching(channel: CheckedChannel, onset_std_s: float) -> CheckedChannel:
@@ -90,5 +111,5 @@ def _std_factors_at_jumps(times: Samples, jumps: list[float], within_s: float) -
     """Factor that takes blocks about a jump out of the fit: their means depend on where in them it lies."""
     factor = np.ones_like(times)
     for jump in jumps:
-        factor[np.abs(times - jump) < within_s] = 1e3
+        factor[np.abs(times - jump) < within_s] = LEFT_OUT
     return factor

@@ -15,6 +15,9 @@ MAX_DAMPING = 1e8
 STALLED_STEPS = 15
 """Steps in a row that together gain nothing, damped and free, after which a minimum lies on a kink: a wall on
 one side refuses the steps that the other asks for. Two rounds of raised and lowered damping."""
+NEAR_ENOUGH = 0.5
+"""Posterior standard deviations from a point to its quadratic's minimum below which a wall between the two, a
+sample that a jump of the force would have to cross, makes no difference."""
 FREE_DAMPING = 1e-3
 """Damping up to which a step's length tells how far the minimum is: it is then shorter by a thousandth."""
 
@@ -109,13 +112,15 @@ def fit(problem: LeastSquares[PointT], initial_guess: Samples, stop: StopRule) -
         The model has no residuals at the initial guess.
     """
     best = problem.linearise(initial_guess)
-    damping, refused = 0.0, math.inf
+    damping, refused, distance = 0.0, math.inf, math.inf
     costs: list[float] = []
     for _ in range(stop.max_steps):
         step = problem.step(best, damping)
         if not math.isfinite(step.length):
             break
         noise = problem.noise(best)
+        if damping <= FREE_DAMPING:
+            distance = step.length
         costs.append(best.cost)
         if len(costs) > STALLED_STEPS and costs[-STALLED_STEPS - 1] - best.cost < stop.cost * noise:
             return best, step, True
@@ -140,5 +145,5 @@ def fit(problem: LeastSquares[PointT], initial_guess: Samples, stop: StopRule) -
             refused = cost - best.cost
             damping = max(10.0 * damping, RAISED_DAMPING)
             if damping > MAX_DAMPING:
-                break
+                return best, step, distance < NEAR_ENOUGH**2 * noise
     return best, step, False

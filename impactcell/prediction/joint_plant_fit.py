@@ -14,9 +14,10 @@ import numpy as np
 
 from impactcell.errors import NotConvergedError, PhysicsError, PredictionError
 from impactcell.features import Features, required
+from impactcell.features.contact import contact_spells
 from impactcell.physics import Plant
 from impactcell.prediction.campaign_problem import COMMON, NO_REST, SHARED, CampaignProblem
-from impactcell.prediction.capture_blocks import linearised_model
+from impactcell.prediction.capture_blocks import linearised_model, until_next_contact
 from impactcell.prediction.linearised_model import (
     DAMPING,
     MU_K,
@@ -27,6 +28,7 @@ from impactcell.prediction.linearised_model import (
     WITH_RECORDER,
     LinearisedModel,
     parameters_of,
+    with_parameters,
 )
 from impactcell.prediction.model import Model, Prior
 from impactcell.prediction.phase_reweighting import (
@@ -37,7 +39,7 @@ from impactcell.prediction.phase_reweighting import (
     std_factors,
 )
 from impactcell.prediction.plant_fit import PlantFit
-from impactcell.prediction.waveform import fit
+from impactcell.prediction.waveform import SHOWN_STDS, fit
 from impactcell.records import Samples
 
 MIN_MU_K = 1e-3
@@ -78,23 +80,27 @@ def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted
         )
     contacts = np.array([contact_constants(tap) for tap in usable])
     stiffness, damping = np.median(contacts, axis=0).tolist()
-    frictions = [max(required(tap.slide).deceleration.value / gravity_m_s2, MIN_MU_K) for tap in usable]
+    frictions = _initial_frictions(usable, gravity_m_s2)
     mean = float(np.mean(frictions))
     start = Plant(stiffness, max(damping, 1.0), mean / INITIAL_RATIO, mean, gravity_m_s2)
-    responses, thetas, intervals = [], [], []
+    responses, thetas, modelled = [], [], []
     for tap, mu_k in zip(usable, frictions, strict=True):
         plant = replace(start, mu_k=mu_k, mu_s=mu_k / INITIAL_RATIO)
         try:
             responses.append(linearised_model(tap, plant))
             thetas.append(np.append(parameters_of(plant), np.zeros(WITH_RECORDER - PARAMETERS + len(COMMON))))
-            slide = required(tap.slide)
-            intervals.append(interval_of_blocks(responses[-1], slide.separation_s, slide.stop_s))
+            modelled.append(tap)
         except PhysicsError as fault:
             faults.append(f"shot {tap.capture.cycle}: {fault}")
     if not responses:
         raise PredictionError(f"no tap of the campaign can be modelled; {faults[0]}")
-    fitted = CampaignProblem(responses, thetas[0][SHARED], WEAK_STD).fit(np.array(thetas))
-    thetas_fitted, covariance = fitted.theta, fitted.covariance
+    anchor = thetas[0][SHARED]
+    once = [until_next_contact(one, tap) for one, tap in zip(responses, modelled, strict=True)]
+    fitted = CampaignProblem(once, anchor, WEAK_STD).fit(np.array(thetas))
+    responses = _with_events_of(fitted.theta, modelled, responses, start)
+    problem = CampaignProblem(responses, anchor, WEAK_STD)
+    fitted = problem.fit(fitted.theta)
+    thetas_fitted, covariance = fitted.theta, fitted.covariance.copy()
     onsets = [row[ONSET] * one.onset_std_s for row, one in zip(thetas_fitted, responses, strict=True)]
     count = sum(response.size for response in responses)
     misfit = math.sqrt(fitted.chi2 / max(count - len(thetas_fitted) - 3, 1))
@@ -103,9 +109,16 @@ def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted
         anchored[:, STIFFNESS], anchored[:, DAMPING] = math.log(stiffness), math.log(max(damping, 1.0))
         if not fitted.is_at_rest:  # to and fro over the kink at mu_k = mu_s, from where nothing leads back
             anchored[:, RATIO] = math.log(INITIAL_RATIO)
+        slides = [required(tap.slide) for tap in modelled]
+        intervals = [
+            interval_of_blocks(one, slide.separation_s, slide.stop_s)
+            for one, slide in zip(responses, slides, strict=True)
+        ]
         thetas_fitted, covariance = _fit_reweighted(responses, anchored, intervals)
     elif not fitted.is_at_rest:
         raise NotConvergedError(NO_REST)
+    else:
+        covariance[0, 0] = problem.ratio_std(fitted) ** 2
     mu_k = float(np.exp(thetas_fitted[:, MU_K]).mean())
     ratio, stiffness, damping = np.exp(thetas_fitted[0, RATIO : DAMPING + 1]).tolist()
     stds = np.sqrt(np.diag(covariance)) * max(misfit, 1.0)
@@ -117,6 +130,33 @@ def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted
     open_onset = [one.onset_std_s > 0.0 for one in responses]
     onset_s = float(np.mean(np.array(onsets)[open_onset])) if any(open_onset) else 0.0
     return PlantFit(model, tuple(tap.capture.cycle for tap in usable), misfit, float(stds[0]), onset_s)
+
+
+def _initial_frictions(taps: Sequence[Features], gravity_m_s2: float) -> list[float]:
+    """Give mu_k of each tap by its slide; where that is too short to show any, that of the other taps."""
+    slowing = [required(tap.slide).deceleration for tap in taps]
+    shown = [one.value for one in slowing if one.value > SHOWN_STDS * one.std]
+    usual = float(np.median(shown)) if shown else 0.0
+    found = [one.value if one.value > SHOWN_STDS * one.std or not shown else usual for one in slowing]
+    return [max(value / gravity_m_s2, MIN_MU_K) for value in found]
+
+
+def _with_events_of(
+    thetas: Samples, taps: Sequence[Features], responses: Sequence[LinearisedModel], plant: Plant
+) -> list[LinearisedModel]:
+    """Average each tap anew, fine where the plant that was fitted to it has its events.
+
+    The force jumps where a part is met again, and a block that the jump crosses is on either side of it by a
+    hair: where the start had the jump elsewhere no step comes to rest. A plant that has no motion keeps its
+    blocks.
+    """
+    found = []
+    for row, tap, response in zip(thetas, taps, responses, strict=True):
+        try:
+            found.append(linearised_model(tap, with_parameters(plant, row)))
+        except PhysicsError:
+            found.append(response)
+    return found
 
 
 def contact_constants(tap: Features) -> tuple[float, float]:
@@ -132,7 +172,9 @@ def contact_constants(tap: Features) -> tuple[float, float]:
     """
     capture, slide = tap.capture, required(tap.slide)
     force, position = required(tap.force), required(tap.position)
-    end = min(slide.separation_s, capture.stroke_m / capture.velocity_m_s)
+    spells = contact_spells(force)
+    separation_s = spells[0][1] if len(spells) > 1 else slide.separation_s
+    end = min(separation_s, capture.stroke_m / capture.velocity_m_s)
     inside = (position.time_s > 0.0) & (position.time_s < end)
     if inside.sum() < 12:
         raise PredictionError(f"shot {capture.cycle}: too few position samples within the contact")

@@ -41,7 +41,8 @@ class PlantFit:
         friction = estimate_from_features(tap, model, self.gap)
         mu_s = friction.mu_s
         if friction.estimator is Estimator.WAVEFORM:
-            mu_s = replace(mu_s, std=max(mu_s.std, self.shared_error * mu_s.value))
+            shared = self.shared_error * mu_s.value
+            mu_s = replace(mu_s, std=max(mu_s.std, shared), common_std=max(mu_s.common_std, shared))
         return replace(friction, mu_s=mu_s)
 
     @property

@@ -16,7 +16,7 @@ from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
 from impactcell.features import Features, SlideFeatures, required
 from impactcell.features.contact import refuse_clipped
 from impactcell.physics import Plant
-from impactcell.prediction.capture_blocks import linearised_model, recorder_std_of
+from impactcell.prediction.capture_blocks import linearised_model, recorder_std_of, until_next_contact
 from impactcell.prediction.linearised_model import (
     MU_K,
     ONSET,
@@ -43,6 +43,12 @@ MU_K_FORM, MU_S_FORM = np.array([1.0, 0.0, 0.0, 0.0]), np.array([1.0, -1.0, 0.0,
 """How ln mu_k and ln mu_s follow theta."""
 MAX_MISFIT = 4.0
 """Misfit of blocks from which on the waveform is not believed at all."""
+SURELY_OVERCOME = 0.8
+"""Share of a tap's largest force below which static friction surely was, noise and all. Our choice."""
+SHOWN_STDS = 3.0
+"""Of its standard deviations, above which a deceleration says how large friction is."""
+LARGEST_STD = 3.0
+"""Standard deviation of ln mu from which on, a factor of twenty, a tap says nothing of friction."""
 REWEIGHTING_ROUNDS = 3
 """Rounds of doubting the phases that the model misses."""
 
@@ -123,9 +129,12 @@ def fit(features: Features, model: Model) -> WaveformFit:
     slide, capture = required(features.slide), features.capture
     prior = prior_of(model, parameter_count(recorder_std_of(capture)))
     theta = prior.mean.copy()
-    theta[MU_K] = math.log(max(deceleration_friction(model, capture.mass_kg, slide), 1e-3))
     if not (capture.mass_kg > 0.0 and capture.velocity_m_s > 0.0):
         raise CaptureError("the part's mass or the actuator's velocity is not known")
+    slowing = deceleration_friction(model, capture.mass_kg, slide)
+    if not slide.deceleration.value > SHOWN_STDS * slide.deceleration.std:
+        slowing = model.plant.mu_k
+    theta[MU_K] = math.log(max(min(slowing, _friction_overcome(features, model)), 1e-3))
     try:
         return _fit(features, model.plant, prior, theta)
     except PhysicsError as fault:
@@ -136,6 +145,9 @@ def fit(features: Features, model: Model) -> WaveformFit:
 
 def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples) -> WaveformFit:
     response = linearised_model(features, with_parameters(plant, start))
+    if (before := until_next_contact(response, features)) is not response:
+        start = min(_fit_both_sides(before, prior, start), key=lambda minimum: minimum.cost).theta
+        response = linearised_model(features, with_parameters(plant, start))
     kink_form = response.kink_form
     offset = response.kink_coordinate(start) - float(kink_form @ start)
     fits = _fit_both_sides(response, prior, start)
@@ -220,8 +232,20 @@ def _likelier_side(
 def _log_normal_moments(posterior: Posterior, of: Samples) -> tuple[float, float]:
     """Mean and standard deviation of exp(`of` @ theta)."""
     mean, std = posterior.moments(_over(of, len(posterior.form)))
+    if not std < LARGEST_STD:
+        raise NotConvergedError("the waveform does not show friction")
     value = math.exp(mean + 0.5 * std * std)
     return value, value * math.sqrt(math.expm1(std * std))
+
+
+def _friction_overcome(features: Features, model: Model) -> float:
+    """Give a mu_k whose mu_s the force of a tap did overcome: where nothing moves no step leads away.
+
+    A slide of few samples may look as if it slowed down by any deceleration.
+    """
+    largest_force_n = float(np.max(required(features.force).values))
+    weight_n = features.capture.mass_kg * model.plant.gravity_m_s2
+    return SURELY_OVERCOME * model.ratio * largest_force_n / weight_n
 
 
 def deceleration_friction(model: Model, mass_kg: float, slide: SlideFeatures) -> float:

@@ -10,7 +10,8 @@ import pytest
 from impactcell.campaign import Excitation, from_contact
 from impactcell.campaign.recorded_campaign import from_captures
 from impactcell.errors import PredictionError
-from impactcell.features import Features, extract
+from impactcell.features import Features, extract, required
+from impactcell.features.contact import contact_spells
 from impactcell.physics import Plant
 from impactcell.prediction import Model, Prior, printed_predictor
 from impactcell.prediction.joint_plant_fit import contact_constants, estimate_mass, fit_plant, ratio_scatter
@@ -235,3 +236,47 @@ def test_scatter_of_the_ratio_is_what_its_errors_leave(error: float, monkeypatch
     expected = math.sqrt(max(between, 0.0))
     assert scatter([hidden, *shown, vague]) == pytest.approx(expected if error < 0.03 else 0.0, rel=1e-9)
     assert scatter([*shown[:4], hidden]) == 0.0, "too few"
+
+
+def taps_of(cell: Tap, seed: int, mu_s_scatter: float, ratio_scatter: float) -> list[Features]:
+    rng = np.random.default_rng(seed)
+    taps = [
+        replace(
+            cell,
+            velocity_m_s=velocity / 6e4,
+            mu_s=cell.mu_s * math.exp(mu_s_scatter * rng.normal()),
+            ratio=cell.ratio * math.exp(ratio_scatter * rng.normal()),
+        )
+        for velocity in (2000, 3000, 4000, 5000, 6000) * 6
+    ]
+    return [extract(tap.capture(rng, cycle=number)) for number, tap in enumerate(taps, 1)]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_ratio_that_taps_show_to_one_side_only_is_not_known(seed: int) -> None:
+    """The slowest taps move just about at once: that mu_s is not larger shows, and nothing else of it."""
+    cell = Tap(0.1, 0.2118, 0.8148, 11.332, 1.5e-3, stiffness=5.679e5, damping=746.96, effects={})
+    found = fit_plant(taps_of(cell, seed, 0.0, 0.01), 9.81).model
+    assert abs(found.ratio - cell.ratio) < 2.5 * found.prior.ratio_std
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_part_that_is_met_again_between_two_samples_has_a_plant(seed: int) -> None:
+    """The force jumps there; the fit went to and fro over a sample and had no end."""
+    cell = Tap(0.1, 0.2184, 0.7594, 9.808, 1.5e-3, stiffness=4.3141e5, damping=782.34, effects={})
+    found = fit_plant(taps_of(cell, seed, 0.03, 0.0), 9.81)
+    assert found.gap < 1.05
+    assert abs(found.model.plant.damping_n_s_per_m - cell.damping) < 1e-3 * cell.damping
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_k_and_b_are_those_of_the_first_contact(seed: int) -> None:
+    """A stiff contact that is made again: over the flight between the two a regression had k an eighth."""
+    cell = Tap(0.1, 0.2037, 0.8187, 6.33, 2.487e-3, stiffness=1.398e6, damping=457.46, effects={})
+    slow = [tap for tap in taps_of(cell, seed, 0.01, 0.0) if tap.capture.velocity_m_s < 0.06]
+    assert len(contact_spells(required(slow[0].force))) > 1
+    constants = np.median([contact_constants(tap) for tap in slow], axis=0)
+    assert constants[0] == pytest.approx(cell.stiffness, rel=0.2)
+    plant = fit_plant(slow, 9.81).model.plant
+    assert plant.stiffness_n_per_m == pytest.approx(cell.stiffness, rel=1e-3)
+    assert plant.damping_n_s_per_m == pytest.approx(cell.damping, rel=1e-3)

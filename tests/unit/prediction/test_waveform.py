@@ -7,7 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from impactcell.errors import CaptureError, ClippedForceError, NoSeparationError, NotConvergedError
+from impactcell.errors import (
+    CaptureError,
+    ClippedForceError,
+    NoSeparationError,
+    NoStopError,
+    NotConvergedError,
+)
 from impactcell.features import extract, noise_std
 from impactcell.physics import Plant, simulate_tap
 from impactcell.prediction import Model, Prior
@@ -216,3 +222,42 @@ def test_the_mean_of_many_taps_is_off_by_what_they_share(velocity_mm_per_min: in
     assert 0.65 < np.sqrt(np.mean(np.square(off))) < 1.4
     assert 0.6 < np.sqrt(np.mean(np.square(within))) < 1.4
     assert np.mean(shares) == pytest.approx(share, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    "tap",
+    [
+        Tap(0.0194242, 0.24698, 0.73946, 5.857, 1.62785e-3, stiffness=5.719102e5, damping=333.98, effects={}),
+        Tap(0.0380961, 0.18245, 0.73798, 9.435, 2.49041e-3, stiffness=4.516017e5, damping=455.97, effects={}),
+        Tap(0.0169845, 0.16241, 0.70450, 7.309, 1.69521e-3, stiffness=6.567803e5, damping=708.36, effects={}),
+    ],
+)  # fmt: skip
+def test_an_actuator_that_meets_the_part_again_bends_no_friction(tap: Tap) -> None:
+    """The force jumps when it does, wherever a sample is; by a rough start it does so at another time."""
+    plant = Plant(tap.stiffness, tap.damping, 0.2, 0.2 * tap.ratio)
+    model = Model("its own", plant, Prior(0.003 * tap.stiffness, 0.005 * tap.damping, 0.01 * tap.ratio))
+    rng = np.random.default_rng(17)
+    pulls = []
+    for _ in range(12):
+        found = fit(extract(tap.capture(rng)), model)
+        pulls.append([(found.mu_s - tap.mu_s) / found.mu_s_std, (found.mu_k - tap.mu_k) / found.mu_k_std])
+        assert found.gap < 1.1
+    assert np.abs(pulls).max() < 4.5
+    assert np.sqrt(np.mean(np.square(pulls), axis=0)).max() < 1.6
+
+
+def test_a_slide_too_short_to_show_how_it_slows_is_no_bad_start() -> None:
+    """By its few samples mu_k was 2.5, a friction that no tap overcomes, and no step led away from there."""
+    tap = Tap(
+        0.047698, 0.203038, 0.737815, 18.14964, 1.1255e-4, stiffness=554411.0, damping=539.468, effects={}
+    )
+    plant = Plant(tap.stiffness, tap.damping, 0.2, 0.2 * tap.ratio)
+    model = Model("its own", plant, Prior(0.003 * tap.stiffness, 0.005 * tap.damping, 0.01 * tap.ratio))
+    rng, shown = np.random.default_rng(18), 0
+    for _ in range(40):
+        features = extract(tap.capture(rng))
+        if not isinstance(features.slide, NoStopError):
+            found, shown = fit(features, model), shown + 1
+            assert abs(found.mu_k - tap.mu_k) < 4.5 * found.mu_k_std
+            assert abs(found.mu_s - tap.mu_s) < 4.5 * found.mu_s_std
+    assert shown > 10
