@@ -10,8 +10,9 @@ from typing import Any
 
 from impactcell.cell import PROVISIONAL, in_place_of
 from impactcell.cli.calibrate import calibrated_model
-from impactcell.cli.own_taps import compare_on_own_taps
-from impactcell.errors import PredictionError, SettingsError
+from impactcell.cli.own_taps import OwnTaps, compare_on_own_taps
+from impactcell.cli.paths import check_output
+from impactcell.errors import ImpactCellError, PredictionError, SettingsError
 from impactcell.physics.law_table import NOMINAL_PARAMETERS
 from impactcell.prediction import Model
 from impactcell.process.console import print_note, print_result
@@ -37,11 +38,7 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
         The cell's journal cannot be read.
     """
     cell_config = read_cell(cell)
-    model = calibrated_model(replace(cell_config, model=read_model(extended)))
-    own_taps = compare_on_own_taps(cell_config, model)
-    if own_taps is not None and own_taps.speaks_against and not anyway:
-        told = f"model {model.name} is not put into service (--anyway would)"
-        raise PredictionError(f"{cell_config.name}: {told}: {own_taps.sentence}")
+    model, own_taps = _judged(cell_config, read_model(extended), anyway=anyway)
     previous = put_into_service(cell_config, model)
     for finding in judge_cell(read_cell(cell)):
         if finding.is_fault:
@@ -59,6 +56,23 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
     )
 
 
+def _judged(config: CellConfig, extended: Model, *, anyway: bool) -> tuple[Model, OwnTaps | None]:
+    """Calibrate a model for the cell, and look at the cell's own taps with it; nothing is written yet.
+
+    Raises
+    ------
+    SettingsError, PredictionError, JournalError
+        Why it cannot be put into service.
+    """
+    check_output(previous_model(config.settings.model), SettingsError)
+    model = calibrated_model(replace(config, model=extended))
+    own_taps = compare_on_own_taps(config, model)
+    if own_taps is not None and own_taps.speaks_against and not anyway:
+        told = f"model {model.name} is not put into service (--anyway would)"
+        raise PredictionError(f"{config.name}: {told}: {own_taps.sentence}")
+    return model, own_taps
+
+
 def put_into_service(config: CellConfig, model: Model) -> Path:
     """Write a model in the place of the cell's own, and return where that is kept from now on.
 
@@ -69,7 +83,10 @@ def put_into_service(config: CellConfig, model: Model) -> Path:
     """
     target = config.settings.model
     previous = previous_model(target)
-    previous.write_bytes(target.read_bytes())
+    try:
+        previous.write_bytes(target.read_bytes())
+    except OSError as error:
+        raise SettingsError(f"{previous}: cannot be written: {error.strerror}") from error
     write_model(in_place_of(config.model, model), target)
     return previous
 
@@ -103,26 +120,42 @@ def restore_model(cell: Path, *, as_json: bool = False) -> None:
     )
 
 
-def compare_models(cell: Path, extended: Path, *, as_json: bool = False) -> None:
-    """Say what `model accept` would change, and change nothing.
+def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json: bool = False) -> None:
+    """Say what `model accept` would change, and change nothing; what that refuses is refused here too.
 
     Raises
     ------
-    SettingsError
-        A file cannot be read.
+    SettingsError, PredictionError, JournalError
+        As `accept_model` would, after the changes are told.
     """
     cell_config = read_cell(cell)
     before, after = cell_config.model, read_model(extended)
+    refusal, own_taps = None, None
+    try:
+        _, own_taps = _judged(cell_config, after, anyway=anyway)
+    except ImpactCellError as error:
+        refusal = error
     changes = [
         {"parameter": name, "before": old, "after": new}
         for name, old, new in _changes(dict(_parameters(before)), dict(_parameters(after)))
     ]
     rows = [f"  {c['parameter']}: {_text(c['before'])} -> {_text(c['after'])}" for c in changes]
+    if own_taps is not None:
+        rows.append(own_taps.sentence)
     _tell(
-        {"cell": cell_config.name, "before": before.name, "after": after.name, "changes": changes},
+        {
+            "cell": cell_config.name,
+            "before": before.name,
+            "after": after.name,
+            "changes": changes,
+            "own_taps": None if own_taps is None else own_taps.content,
+            "refused": None if refusal is None else str(refusal),
+        },
         "\n".join([f"{cell_config.name}: {before.name} -> {after.name}", *rows]),
         as_json=as_json,
     )
+    if refusal is not None:
+        raise refusal
 
 
 def previous_model(model_file: Path) -> Path:

@@ -26,7 +26,7 @@ from impactcell.prediction.model import Prior
 from impactcell.process.console import print_note, print_result
 from impactcell.process.shipped import shipped_config
 from impactcell.settings import read_cell
-from impactcell.settings.fields import cell_name
+from impactcell.settings.fields import cell_name, module_host
 from impactcell.settings.judgement import judge_cell
 from impactcell.settings.model_file import write_model
 
@@ -116,10 +116,11 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
     CampaignError, PredictionError
         No model can be fitted to the campaign.
     """
-    try:
-        cell_name(answers.name)
-    except ValueError as error:
-        raise SettingsError(f"--name {answers.name!r}: {error}") from error
+    for option, see, value in (("name", cell_name, answers.name), ("host", module_host, answers.host)):
+        try:
+            see(value)
+        except ValueError as error:
+            raise SettingsError(f"--{option} {value!r}: {error}") from error
     check_directory(directory, SettingsError)
     source = _map_file(answers.register_map)
     cell, model = directory / f"{answers.name}.yaml", directory / f"{answers.name}.model.yaml"

@@ -17,7 +17,9 @@ def model_accept(
         Path, typer.Argument(metavar="MODEL.yaml", help="As the discrepancy workflow wrote it.")
     ],
     *,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what would change.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only say what would change, or why it would be refused.")
+    ] = False,
     anyway: Annotated[
         bool, typer.Option("--anyway", help="Also if the cell's own last taps speak against it.")
     ] = False,
@@ -27,7 +29,7 @@ def model_accept(
     from impactcell.cli.accept_model import accept_model, compare_models
 
     if dry_run:
-        compare_models(cell, extended, as_json=as_json)
+        compare_models(cell, extended, anyway=anyway, as_json=as_json)
     else:
         accept_model(cell, extended, anyway=anyway, as_json=as_json)
 

@@ -1,8 +1,9 @@
 """What the sections of a cell file are made of: paths, ranges, addresses, names."""
 
 import re
+from ipaddress import ip_address
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
@@ -54,6 +55,8 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 """A finite number of at least 0."""
 Probability = Annotated[float, Field(gt=0, lt=1)]
 """A number between 0 and 1, both excluded."""
+_PORT: Final = re.compile(r"(?<![:\[]):(\d+)$")
+"""Port behind a host; an IPv6 address has colons of its own."""
 
 
 def opcua_endpoint(value: str) -> str:
@@ -78,6 +81,33 @@ def page_endpoint(value: str) -> str:
     if not is_whole or parts.path not in ("", "/") or parts.query or parts.fragment or parts.username:
         raise ValueError("a page's endpoint has scheme, host and port, as in http://127.0.0.1:8480")
     return value.rstrip("/")
+
+
+def module_host(value: str) -> str:
+    """See that a host is a name or an address alone, as a connection is opened to it.
+
+    >>> module_host("10.0.0.5"), module_host("fe80::1%eth0")
+    ('10.0.0.5', 'fe80::1%eth0')
+    >>> module_host("tcp://press-1:502/")
+    Traceback (most recent call last):
+    ValueError: a host is a name or an address alone: write `host: press-1` and `port: 502`
+    """
+    if _is_host(value):
+        return value
+    bare = re.sub(r"^\w[\w+.-]*://|[/?#].*$", "", value.strip())
+    name, port = _PORT.sub("", bare).strip("[]"), _PORT.search(bare)
+    meant = f"`host: {name}`" if _is_host(name) else "it as in `host: 10.0.0.5` or `host: press-1.local`"
+    behind = f" and `port: {port[1]}`" if port and _is_host(name) else ""
+    raise ValueError(f"a host is a name or an address alone: write {meant}{behind}")
+
+
+def _is_host(value: str) -> bool:
+    try:
+        ip_address(value)
+    except ValueError:
+        is_number = re.fullmatch(r"[\d.]*", value) is not None
+        return not is_number and re.fullmatch(r"\w[\w.-]*", value) is not None
+    return True
 
 
 def cell_name(value: str) -> str:

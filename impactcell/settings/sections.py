@@ -22,6 +22,7 @@ from impactcell.settings.fields import (
     Probability,
     Section,
     cell_name,
+    module_host,
     opcua_endpoint,
 )
 from impactcell.settings.positioning_section import PositioningSection
@@ -85,7 +86,7 @@ class ModuleSection(Section):
     serial: SerialSection | None = None
     """Serial line of transport `rtu`, in the place of host and port."""
 
-    host: str = _LINK.host
+    host: Annotated[str, AfterValidator(module_host)] = _LINK.host
     """Address of the module, or of the gateway in front of it."""
     port: Annotated[int, Field(ge=1, le=65535)] = _LINK.port
     """TCP port; 802 is customary with TLS."""

@@ -159,7 +159,10 @@ class StudyQueue:
             if cell is not None and result.get("effects"):  # what it found is shown meanwhile
                 extended = str(results / result["model"])
                 arguments = ["model", "accept", str(cell), extended, "--dry-run", "--json"]
-                study.changes = _json((await self._verb(study, arguments)).output)
+                outcome = await self._verb(study, arguments, may_fail=True)
+                study.changes = _json(outcome.output)  # what speaks against the model stands in it
+                if not study.changes:
+                    raise StudyFailedError("\n".join(_faults(study, self.store, outcome)))
         study.stage = Stage.DONE
 
     async def _verb(

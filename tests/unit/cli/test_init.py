@@ -200,6 +200,12 @@ def test_the_first_model_is_that_of_the_plant(
     assert "good enough to estimate friction with" in capsys.readouterr().out
 
 
+def test_a_host_that_is_more_than_an_address_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    with pytest.raises(SettingsError, match=r"--host '10\.0\.0\.5:503': .* and `port: 503`"):
+        run_verb(["init", str(tmp_path / "d"), *ANSWERS, "--host", "10.0.0.5:503"])
+    assert not (tmp_path / "d").exists()
+
+
 @pytest.mark.parametrize("campaign", [False, True])
 def test_the_noise_of_the_sensors_is_what_was_said_or_what_the_taps_show(
     begun: Path, shots: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, campaign: bool

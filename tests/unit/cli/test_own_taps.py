@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from impactcell.cli.accept_model import previous_model
 from impactcell.cli.app import run_verb
 from impactcell.cli.own_taps import TAPS, OwnTaps, compare_on_own_taps
-from impactcell.errors import PredictionError
+from impactcell.errors import PredictionError, SettingsError
 from impactcell.journal.store import Journal
 from impactcell.prediction import Model
 from impactcell.settings import read_cell
@@ -89,6 +90,42 @@ def test_a_model_of_another_plant_is_put_into_service_only_if_that_is_meant(
     assert told["taps"] == TAPS
     assert told["gap_after"] > 1.5 * told["gap_before"]
     assert read_cell(cell).model.name == "in oil"
+
+
+def test_a_dry_run_refuses_what_would_be_refused_and_tells_what_would_change(
+    cell: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other, before = cell.parent / "other.yaml", read_cell(cell).model
+    write_model(oily(before), other)
+    with pytest.raises(PredictionError) as refused:
+        run_verb(["model", "accept", str(cell), str(other)])
+    capsys.readouterr()
+    with pytest.raises(PredictionError) as foretold:
+        run_verb(["model", "accept", str(cell), str(other), "--dry-run", "--json"])
+    assert str(foretold.value) == str(refused.value)
+    told = json.loads(capsys.readouterr().out)
+    assert told["refused"] == str(refused.value)
+    assert [change["after"] for change in told["changes"]] == [300.0]
+    with pytest.raises(SystemExit) as ended:
+        run_verb(["model", "accept", str(cell), str(other), "--dry-run", "--anyway", "--json"])
+    assert ended.value.code == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["refused"] is None
+    assert told["own_taps"]["gap_after"] > 1.5 * told["own_taps"]["gap_before"]
+    assert read_cell(cell).model == before
+    assert not previous_model(read_cell(cell).settings.model).exists()
+
+
+def test_a_dry_run_sees_that_the_model_before_could_not_be_kept(cell: Path) -> None:
+    other = cell.parent / "other.yaml"
+    write_model(read_cell(cell).model, other)
+    previous_model(read_cell(cell).settings.model).mkdir()
+    said = []
+    for dry in ([], ["--dry-run"]):
+        with pytest.raises(SettingsError, match=r"model\.previous\.yaml: is a directory") as refused:
+            run_verb(["model", "accept", str(cell), str(other), *dry])
+        said.append(str(refused.value))
+    assert said[0] == said[1]
 
 
 def test_a_cell_without_taps_of_its_own_takes_any_model(

@@ -52,10 +52,26 @@ def test_every_fault_at_once_with_its_place(config: Path) -> None:
         assert hint in str(caught.value)
 
 
+@pytest.mark.parametrize("host", ["10.0.0.5", "press-1.local", "fpga_2", "::1", "fe80::1%eth0", "prüfstand"])
+def test_a_name_or_an_address_is_a_host(config: Path, host: str) -> None:
+    assert read_cell(edited(config, "host: 127.0.0.1", f"host: '{host}'")).settings.module.host == host
+
+
 @pytest.mark.parametrize(
     ("old", "new", "complaint"),
     [
         ("port: 15020", "port: '15020'", "module.port: should be a valid integer, not '15020'"),
+        (
+            "host: 127.0.0.1",
+            "host: http://10.0.0.5",
+            "6:9: module.host: a host is a name or an address alone: write `host: 10.0.0.5`",
+        ),
+        ("host: 127.0.0.1", "host: 10.0.0.5:503", "write `host: 10.0.0.5` and `port: 503`"),
+        ("host: 127.0.0.1", "host: '[fe80::1]:503/modbus'", "write `host: fe80::1` and `port: 503`"),
+        ("host: 127.0.0.1", "host: ' press-1'", "write `host: press-1`"),
+        ("host: 127.0.0.1", "host: the module", "write it as in `host: 10.0.0.5`"),
+        ("host: 127.0.0.1", "host: 10.0.0.256", "write it as in `host: 10.0.0.5`"),
+        ("host: 127.0.0.1", "host: ''", "write it as in `host: 10.0.0.5`"),
         ("port: 15020", "port: 70000", "less than or equal to 65535"),
         ("wear_limit: 0.25", "wear_limit: .nan", "finite"),
         ("wear_limit: 0.25", "wear_limit: 0.2\n  wear_limit: 0.3", "twice"),

@@ -155,6 +155,27 @@ async def test_a_campaign_is_dropped_confirmed_and_studied(page: Page, verbs: Ve
     assert "/accept" not in text, "an operator accepts nothing"
 
 
+async def test_what_speaks_against_the_model_is_told_before_anybody_accepts_it(
+    page: Page, verbs: Verbs
+) -> None:
+    refused = (
+        f"{CELL}: model oil is not put into service (--anyway would): of the cell's last 30 taps it leaves "
+        "2.3 times the sensors' noise, 30 estimates are usable; the model before leaves 1 times the sensors' "
+        "noise, 30 are"
+    )
+    verbs.outcomes["model"] = VerbOutcome(1, json.dumps(CHANGES | {"refused": refused}), (refused,))
+    async with page.logged_in(Role.ENGINEER) as client:
+        study, _ = await drop(client, "shots.zip", campaign_zip())
+        await until(page, study, Stage.CONFIRMING)
+        data = {"csrf": await csrf_of(client), "goal": "discrepancy"}
+        await client.post(f"/studies/{study}/run", data=data)
+        await until(page, study, Stage.DONE)
+        shown = {code: (await client.get(f"/studies/{study}?lang={code}")).text for code in ("en", "de")}
+    assert "the cell&#39;s own taps speak against it" in shown["en"]
+    assert "die eigenen Stöße der Zelle sprechen dagegen" in shown["de"]
+    assert "Missing: viscous friction." in shown["en"]
+
+
 async def test_an_engineer_accepts_and_takes_back(page: Page) -> None:
     async with page.logged_in(Role.ENGINEER) as client:
         study, _ = await drop(client, "shots.zip", campaign_zip())
