@@ -56,14 +56,16 @@ def read_users(path: Path) -> dict[str, User]:
     """
     if not path.exists():
         return {}
+    way_out = f"move it away, and make one with `impactcell users add {shlex.quote(str(path))} NAME`"
+    if path.is_dir():
+        raise AccessError(f"{path}: is a directory, where a users file is needed; name a file in it")
     try:
         data, _ = yaml_loader.load(path)
     except SettingsError as error:
-        raise AccessError(str(error)) from error
+        raise AccessError(f"{error}; a users file is needed: correct it, or {way_out}") from error
     entries = data.get("users") if isinstance(data, dict) else None
     if not isinstance(entries, list):
-        command = f"impactcell users add {shlex.quote(str(path))} NAME"
-        raise AccessError(f"{path}: not a users file; move it away, and make one with `{command}`")
+        raise AccessError(f"{path}: not a users file; {way_out}")
     users: dict[str, User] = {}
     for number, entry in enumerate(entries, 1):
         user = _user(entry, f"{path}: user {number}")

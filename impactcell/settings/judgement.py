@@ -1,6 +1,7 @@
 """A cell judged as a whole: files that are right each for itself, and do not fit each other."""
 
 import math
+import os
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ from pathlib import Path
 from statistics import median
 from typing import Final
 
-from impactcell.errors import JournalError
+from impactcell.errors import AccessError, JournalError
 from impactcell.features import noise_std
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.map_registers import unknown_names
@@ -17,6 +18,7 @@ from impactcell.journal.store import Journal
 from impactcell.prediction.mass_interpolation import velocity_range_m_s
 from impactcell.process import yaml_loader
 from impactcell.process.yaml_loader import FilePosition
+from impactcell.scada.users import read_users
 from impactcell.settings.cells import CellConfig
 from impactcell.settings.plausible_tap import doubted_values, immovable
 
@@ -26,6 +28,13 @@ CONSTANT_TOLERANCE: Final = 1e-3
 """A constant of a map may differ from what the cell file says by this share: rounding."""
 LARGEST_NOISE: Final = 0.05
 """Of the signal of the cell's fastest tap; a sensor with more tells nothing of it. Our choice."""
+SMALLEST_NOISE: Final = {"force": 1e-6, "position": 1e-4}
+"""In N and µm: the weight of a speck of dust, the size of an atom. What follows a tap within a millisecond
+is far coarser. Our choice."""
+NOISE_UNITS: Final = {"force": {"mN": 1e-3, "kN": 1e3}, "position": {"nm": 1e-3, "mm": 1e3, "m": 1e6}}
+"""What a noise may have been said in, by what one of them is in N or µm."""
+LEAST_USUAL_NOISE: Final = 0.01
+"""In N or µm: below it no unit is proposed."""
 NOISE_TOLERANCE: Final = 1.5
 """Noise measured over noise said, beyond which a good model will have a gap of as much. Our choice."""
 NOISE_TAPS: Final = 10
@@ -168,9 +177,16 @@ def _of_sensors(cell: CellConfig) -> Iterator[_Remark]:
             message += "" if math.isnan(measured) else f"; {shown}"
             yield _Remark(("sensors",), f"{message}; say `{key}` under `sensors`", is_fault=False)
         elif said > LARGEST_NOISE * largest:
+            why = f"the fastest tap shows some {largest:.0f} {unit}"
             yield _Remark(
                 ("sensors", key),
-                f"a noise of {said:g} {unit} cannot be: the fastest tap shows some {largest:.0f} {unit}",
+                f"a noise of {said:g} {unit} cannot be: {why}; {_noise_meant(said, sensor, largest)}",
+            )
+        elif said < SMALLEST_NOISE[sensor]:
+            why = f"no sensor that follows a tap has less than {SMALLEST_NOISE[sensor]:g} {unit}"
+            yield _Remark(
+                ("sensors", key),
+                f"a noise of {said:g} {unit} cannot be: {why}; {_noise_meant(said, sensor, largest)}",
             )
         elif measured > NOISE_TOLERANCE * said:
             yield _Remark(
@@ -179,6 +195,19 @@ def _of_sensors(cell: CellConfig) -> Iterator[_Remark]:
                 "lacked something",
                 is_fault=False,
             )
+
+
+def _noise_meant(said: float, sensor: str, largest: float) -> str:
+    """Say in which units a noise that cannot be would be one, and what to write then."""
+    values = {unit: factor * said for unit, factor in NOISE_UNITS[sensor].items()}
+    meant = {
+        unit: f"{value:g}"
+        for unit, value in values.items()
+        if LEAST_USUAL_NOISE <= value <= LARGEST_NOISE * largest
+    }
+    if not meant:
+        return "check its unit"
+    return f"if that was meant in {' or '.join(meant)}, write {' or '.join(meant.values())}"
 
 
 def _measured_noise(cell: CellConfig, sensor: str) -> float:
@@ -216,13 +245,25 @@ def _of_map(cell: CellConfig) -> Iterator[_Remark]:
 
 def _of_service(cell: CellConfig) -> Iterator[_Remark]:
     settings = cell.settings
-    users = settings.opcua.users_file
-    if not users.is_file():
-        yield _Remark(
-            ("opcua", "users_file"),
-            f"there is no users file {users}: nobody can log in, over OPC UA or on the page; run "
-            f"`impactcell users add {shlex.quote(str(users))} NAME --role engineer`",
-            is_fault=False,
-        )
+    yield from _of_users(settings.opcua.users_file)
     if settings.journal is None:
         yield _Remark((), "no journal: what the cell learns is lost with every restart", is_fault=False)
+
+
+def _of_users(file: Path) -> Iterator[_Remark]:
+    """Say why nobody can log in; a file that is none of users is a fault, for `run` ends with it."""
+    place, add = (
+        ("opcua", "users_file"),
+        f"`impactcell users add {shlex.quote(str(file))} NAME --role engineer`",
+    )
+    nobody = f"nobody can log in, over OPC UA or on the page; run {add}"
+    if not file.exists():
+        yield _Remark(place, f"there is no users file {file}: {nobody}", is_fault=False)
+    elif not os.access(file, os.R_OK):  # its owner's alone, who need not be who checks
+        yield _Remark(place, f"the users file {file} is not yours to read: not looked at", is_fault=False)
+    else:
+        try:
+            if not read_users(file):
+                yield _Remark(place, f"the users file {file} holds nobody: {nobody}", is_fault=False)
+        except AccessError as error:
+            yield _Remark(place, f"opcua.users_file: {error}")

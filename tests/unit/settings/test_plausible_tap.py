@@ -52,6 +52,44 @@ def test_what_is_hardly_meant_is_told_with_the_unit_in_which_it_would_be(
     assert re.search(told, doubts[0].message)
 
 
+@pytest.mark.parametrize("noise_um", ["0.0015", "0.5", "100"])
+def test_a_noise_that_may_be_is_not_doubted(tmp_path: Path, noise_um: str) -> None:
+    """That of an interferometer, of an encoder, of a laser triangulator."""
+    findings = judged(tmp_path, {"position_noise_std_um": noise_um}, {})
+    assert not [finding.message for finding in findings if "a noise of" in finding.message]
+
+
+USERS = "users: [{name: eva, role: engineer, password: x}]"
+
+
+@pytest.mark.parametrize(
+    ("text", "is_fault", "told"),
+    [
+        ("hello", True, "opcua.users_file: .*/users.yaml: not a users file; .* `impactcell users add /"),
+        ('{"a": 1}', True, "users.yaml: not a users file; move it away, and make one with"),
+        ("users: [", True, "users.yaml:1:9: .*; a users file is needed: correct it, or .* users add /"),
+        ("", True, "users.yaml:1:1: the file is empty; a users file is needed: correct it, or"),
+        ("users: [{name: eva, role: king, password: x}]", True, "users.yaml: user 1: the role is one of"),
+        ("users: []", False, "users.yaml holds nobody: nobody can log in.*; run `impactcell users add /"),
+        (USERS, None, ""),
+    ],
+)
+def test_a_users_file_is_looked_into(tmp_path: Path, text: str, is_fault: bool | None, told: str) -> None:
+    (tmp_path / "users.yaml").write_text(text, encoding="utf-8")
+    found = [finding for finding in judged(tmp_path, {}, {}) if "users" in finding.message]
+    assert [finding.is_fault for finding in found] == ([] if is_fault is None else [is_fault])
+    assert not found or re.search(told, found[0].message)
+
+
+def test_a_directory_is_no_users_file(tmp_path: Path) -> None:
+    (tmp_path / "users.yaml").mkdir()
+    found = [finding for finding in judged(tmp_path, {}, {}) if "users" in finding.message]
+    assert [finding.is_fault for finding in found] == [True]
+    assert found[0].message.endswith(
+        "users.yaml: is a directory, where a users file is needed; name a file in it"
+    )
+
+
 @pytest.mark.parametrize("cell", sorted((CONFIG / "cells").glob("*.yaml")), ids=lambda path: path.stem)
 def test_the_cells_that_come_with_the_program_are_meant(cell: Path) -> None:
     said = [finding.message for finding in judge_cell(read_cell(cell))]
