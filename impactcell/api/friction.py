@@ -1,6 +1,7 @@
 """Friction of a tap, from its arrays or from the shots of a campaign."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
@@ -9,14 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from impactcell.errors import CaptureError, PhysicsError, PredictionError
+from impactcell.errors import CaptureError, NotConvergedError, PhysicsError, PredictionError
 from impactcell.features import Features, extract, noise_std
 from impactcell.physics import TapInput
 from impactcell.prediction import Model, calibrate, estimate_from_features
 from impactcell.prediction.joint_plant_fit import estimate_mass, fit_plant
 from impactcell.process.console import print_note
 from impactcell.process.progress import progress
-from impactcell.records import Capture, Channel, FrictionEstimate, Samples, as_recorded
+from impactcell.records import MM_PER_MIN, Capture, Channel, FrictionEstimate, Samples, as_recorded
 
 FRICTIONS = 9
 """Values of mu_s that are swept for each mass of a campaign: three times the coefficients of (4) and (5)."""
@@ -31,6 +32,10 @@ LEAST_NOISE = 1e-4
 a sixth. Without it a simulated trace without noise would be held to the last bit of a float."""
 GRAVITY_M_S2 = 9.81
 """Of a tap given as arrays; m/s²."""
+FASTEST_M_S = 10.0
+"""Beyond it nothing is an actuator's velocity: ten times that of the fastest drives. Our choice."""
+USUAL_M_S = (1e-3, 1.0)
+"""Where velocities of taps lie: 60 to 60 000 mm/min."""
 
 
 def estimate(
@@ -70,7 +75,7 @@ def estimate(
     Raises
     ------
     CaptureError
-        Arrays of different lengths, or of more than one dimension.
+        Arrays of different lengths, or of more than one dimension; a velocity or mass that cannot be.
     SettingsError
         The model file cannot be read.
     PredictionError
@@ -90,6 +95,8 @@ def estimate(
             f"time_s, force_n and position_m must be of one length and one dimension, "
             f"not of shapes {time.shape}, {force.shape} and {position.shape}"
         )
+    _check_velocity(velocity_m_s, is_needed=model is None)
+    _check_mass(mass_kg, is_needed=model is None)
     capture = Capture(
         cycle=1,
         velocity_m_s=velocity_m_s,
@@ -103,8 +110,44 @@ def estimate(
         from impactcell.settings.model_file import read_model
 
         return estimate_from_features(features, read_model(Path(model)))
-    fit = fit_plant([features], GRAVITY_M_S2)
+    try:
+        fit = fit_plant([features], GRAVITY_M_S2)
+    except (PredictionError, PhysicsError) as fault:
+        raise _of_one_tap(fault) from fault
     return fit.estimate(features, calibrated_where_possible(fit.model, [capture]))
+
+
+def _check_velocity(velocity_m_s: float, *, is_needed: bool) -> None:
+    if velocity_m_s > FASTEST_M_S:
+        units = {"mm/min": velocity_m_s * MM_PER_MIN, "mm/s": velocity_m_s * 1e-3}
+        meant = next((unit for unit, speed in units.items() if USUAL_M_S[0] <= speed <= USUAL_M_S[1]), None)
+        way_out = f"if that was meant in {meant}, give {units[meant]:.6g}" if meant else "check its unit"
+        raise CaptureError(
+            f"velocity_m_s = {velocity_m_s:g}: no actuator taps faster than {FASTEST_M_S:g} m/s; {way_out}"
+        )
+    if velocity_m_s < 0.0 or (is_needed and not velocity_m_s > 0.0):
+        raise CaptureError(
+            f"velocity_m_s = {velocity_m_s:g}: give the actuator's speed in m/s, above 0; position_m is "
+            "positive along the tap"
+        )
+
+
+def _check_mass(mass_kg: float, *, is_needed: bool) -> None:
+    if mass_kg < 0.0 or math.isinf(mass_kg) or (is_needed and not mass_kg > 0.0):
+        raise CaptureError(f"mass_kg = {mass_kg:g}: give the mass of the part in kg, above 0")
+
+
+def _of_one_tap(fault: PredictionError | PhysicsError) -> PredictionError:
+    """Say of the one tap that was given what a fit says of a campaign."""
+    if isinstance(fault, NotConvergedError):
+        return NotConvergedError(
+            "no k, b and mu_k/mu_s explain the tap; see that velocity, mass, stroke, the units of the traces "
+            "and t = 0, first contact, are right, or give the cell's model",
+            fault.gap,
+        )
+    reason = re.sub(r"^no tap of the campaign can be (?:used|modelled); |shot 1: ", "", str(fault))
+    hint = "; check velocity, mass, stroke and the units of the traces" if "modelled" in str(fault) else ""
+    return PredictionError(f"the tap cannot be used: {reason}{'' if 'check' in reason else hint}")
 
 
 def _channel(time_s: Samples, values: Samples) -> Channel:

@@ -53,6 +53,11 @@ CONTACT_STD = np.array([0.3, 3e-4, 2e-3, 1.0, 1.0, 1.0])
 """The same where k and b of the contact alone are believed more than the model of the whole tap."""
 MIN_RATIO_STD = 1e-3
 """Least standard deviation of mu_k/mu_s from tap to tap that a prior is given. Our choice."""
+NO_RISE = (
+    "the force does not rise with how far the actuator, at its velocity, has pressed into the part; check "
+    "velocity, the units of times and position, and that t = 0 is first contact"
+)
+"""What is said where a contact that is no spring's shows no stiffness."""
 REWEIGHTING_ROUNDS = 4
 """Rounds of weighing the phases by what the model misses of them. Our choice."""
 
@@ -80,6 +85,10 @@ def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted
         )
     contacts = np.array([contact_constants(tap) for tap in usable])
     stiffness, damping = np.median(contacts, axis=0).tolist()
+    if not stiffness > 0.0:
+        raise PredictionError(
+            f"no tap of the campaign can be modelled; shot {usable[0].capture.cycle}: {NO_RISE}"
+        )
     frictions = _initial_frictions(usable, gravity_m_s2)
     mean = float(np.mean(frictions))
     start = Plant(stiffness, max(damping, 1.0), mean / INITIAL_RATIO, mean, gravity_m_s2)

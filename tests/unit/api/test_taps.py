@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import impactcell
-from impactcell.errors import CaptureError, PhysicsError, PredictionError, SettingsError
+from impactcell.errors import CaptureError, NotConvergedError, PhysicsError, PredictionError, SettingsError
 from impactcell.features import white_noise_std
 from impactcell.physics import Plant
 from impactcell.records import Quality
@@ -96,8 +96,61 @@ def test_a_models_predictors_are_used(pytestconfig: pytest.Config) -> None:
 
 def test_arrays_in_which_no_tap_is_seen_say_so() -> None:
     nothing = np.zeros(500)
-    with pytest.raises(PredictionError, match="no tap"):
+    with pytest.raises(PredictionError, match=r"^the tap cannot be used: the position is constant at 0$"):
         impactcell.estimate(np.arange(500) * 1e-4, nothing, nothing, 0.05, 18.9)
+
+
+@pytest.mark.parametrize(
+    ("velocity_m_s", "mass_kg", "message"),
+    [
+        (2400.0, 18.9, "velocity_m_s = 2400: no actuator .* 10 m/s; if that was meant in mm/min, give 0.04"),
+        (40.0, 18.9, "if that was meant in mm/s, give 0.04"),
+        (math.inf, 18.9, "check its unit"),
+        (0.0, 18.9, "velocity_m_s = 0: give the actuator's speed in m/s, above 0"),
+        (-0.04, 18.9, "velocity_m_s = -0.04: give the actuator's speed"),
+        (math.nan, 18.9, "velocity_m_s = nan: give the actuator's speed"),
+        (0.04, 0.0, "mass_kg = 0: give the mass of the part in kg"),
+        (0.04, math.nan, "mass_kg = nan: give the mass of the part in kg"),
+    ],
+)
+def test_a_velocity_or_mass_that_cannot_be_is_refused(
+    velocity_m_s: float, mass_kg: float, message: str, pytestconfig: pytest.Config
+) -> None:
+    tap = impactcell.simulate_tap(0.04, 18.9, plant=PLANT)
+    traces = tap.time_s, tap.force_n, tap.position_m
+    with pytest.raises(CaptureError, match=message):
+        impactcell.estimate(*traces, velocity_m_s, mass_kg)
+    if abs(velocity_m_s) > 1.0:
+        model = pytestconfig.rootpath / "config" / "models" / "prototype.yaml"
+        with pytest.raises(CaptureError, match=message):
+            impactcell.estimate(*traces, velocity_m_s, mass_kg, model=model)
+
+
+@pytest.mark.parametrize(
+    ("per_second", "per_metre", "velocity_m_s"), [(1.0, 1.0, 4.0), (1e3, 1.0, 0.04), (1.0, 1e3, 0.04)]
+)
+def test_units_that_make_a_tap_hopeless_are_to_be_looked_at(
+    per_second: float, per_metre: float, velocity_m_s: float
+) -> None:
+    """It was told that a stiffness must be positive, of which nobody had said anything."""
+    tap = impactcell.simulate_tap(0.04, 18.9, plant=PLANT)
+    traces = per_second * tap.time_s, tap.force_n, per_metre * tap.position_m
+    with pytest.raises(PredictionError, match=r"^the tap cannot be used: the force does not rise .* check"):
+        impactcell.estimate(*traces, velocity_m_s, 18.9)
+
+
+def test_a_force_in_other_units_is_to_be_looked_at() -> None:
+    tap = impactcell.simulate_tap(0.04, 18.9, plant=PLANT)
+    with pytest.raises(
+        PredictionError, match=r"^the tap cannot be used: .*; check .* the units of the traces$"
+    ):
+        impactcell.estimate(tap.time_s, 1e-3 * tap.force_n, tap.position_m, 0.04, 18.9)
+
+
+def test_a_mass_that_no_plant_explains_is_told_without_the_words_of_a_campaign() -> None:
+    tap = impactcell.simulate_tap(0.04, 18.9, plant=PLANT)
+    with pytest.raises(NotConvergedError, match=r"^no k, b and mu_k/mu_s explain the tap; .* mass"):
+        impactcell.estimate(tap.time_s, tap.force_n, tap.position_m, 0.04, 18900.0)
 
 
 def test_what_cannot_be_used_is_refused(tmp_path: Path) -> None:
