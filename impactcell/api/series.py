@@ -10,6 +10,7 @@ from impactcell.cell.series_replay import TrackedSeries, replay, whole_number_fa
 from impactcell.errors import SeriesError
 from impactcell.records import Samples
 from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings
+from impactcell.tracking.wear_batch.input_validation import LARGEST_FRICTION
 
 
 def track(
@@ -68,6 +69,11 @@ def track(
             raise SeriesError(f"cycle[{place}] = {number:g} {fault}")
     if not limit > 0.0:
         raise SeriesError(f"limit = {limit:g}: give the mu_s at which the surface is worn, or leave it out")
+    if LARGEST_FRICTION < limit < math.inf:
+        raise SeriesError(
+            f"limit = {limit:g}: no surface reaches it, for a mu_s above {LARGEST_FRICTION:g} is not used; "
+            f"give the mu_s at which it is worn, {0.01 * limit:g} if that was meant in %"
+        )
     observations = [
         FrictionObservation(int(at), float(value), float(std), batch_id=batch_id)
         for at, value, std, batch_id in zip(cycles, values, stds, batches, strict=True)

@@ -14,7 +14,10 @@ from impactcell.cli.series_file import COLUMNS, SeriesFile, read_series
 from impactcell.errors import SeriesError
 from impactcell.process.console import print_note
 from impactcell.records.uncertainty import plus_minus
+from impactcell.settings.plausible_tap import FRICTION
 from impactcell.tracking.wear_batch import BatchKnowledge, TrackerSettings
+from impactcell.tracking.wear_batch.input_validation import LARGEST_FRICTION
+from impactcell.tracking.wear_batch.noise_scale import GUESSED_RELATIVE_STD
 
 FIGURES: Final = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 """Numbers in a note."""
@@ -52,6 +55,11 @@ def track(
         knowledge = BatchKnowledge.KNOWN if file.has_batch else BatchKnowledge.UNKNOWN
     if limit is not None and not 0.0 < limit < math.inf:
         raise SeriesError(f"--limit {limit:g}: say the mu_s at which the surface is worn, 0.25 say")
+    if limit is not None and limit > LARGEST_FRICTION:
+        raise SeriesError(
+            f"--limit {limit:g}: no surface reaches it, for a mu_s above {LARGEST_FRICTION:g} is not used; "
+            f"say the mu_s at which it is worn, {0.01 * limit:g} if that was meant in %"
+        )
     settings = TrackerSettings(wear_limit=math.inf if limit is None else limit, batch=knowledge)
     try:
         tracked = replay(settings, file.observations)
@@ -65,6 +73,13 @@ def track(
         )
     if file.unread:
         print_note(_unread(series, file))
+    if all(math.isnan(observation.mu_s_std) for observation in file.observations):
+        print_note(
+            f"{series}: no standard deviations (`mu_s_std`): {100.0 * GUESSED_RELATIVE_STD:g} % of mu_s is "
+            "taken, and learned from the scatter of the series; add them where they are known"
+        )
+    if limit is not None and (doubt := FRICTION.doubt(limit)):
+        print_note(f"--limit: {doubt}")
     text = json.dumps(_as_json(tracked)) if as_json else _as_text(tracked)
     sys.stdout.write(text + "\n")
 

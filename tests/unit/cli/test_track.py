@@ -237,6 +237,33 @@ def test_a_limit_that_is_no_friction_is_refused(tmp_path, limit):
         track(write(tmp_path / "s.csv", truth(60, at=0)), limit=limit)
 
 
+def test_a_limit_in_per_cent_is_refused_or_doubted(tmp_path, capsys):
+    path = write(tmp_path / "s.csv", truth(60, at=0))
+    with pytest.raises(
+        SeriesError, match=r"--limit 25: no surface reaches it, .* 0\.25 if that was meant in %"
+    ):
+        track(path, limit=25.0)
+    with pytest.raises(SeriesError, match=r"limit = 25: no surface reaches it, .* 0\.25 if that was meant"):
+        impactcell.track([1, 2], [0.2, 0.2], limit=25.0)
+    track(path, limit=8.0)
+    assert "--limit: a friction coefficient of 8 is hardly meant" in capsys.readouterr().err
+    track(path, limit=0.3)
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("column", [True, False])
+def test_what_stands_in_for_standard_deviations_is_told(tmp_path, capsys, column):
+    path = write(tmp_path / "s.csv", truth(60, at=0), std=None)
+    if not column:
+        path.write_text("".join(f"{line.rpartition(',')[0]}\n" for line in path.read_text().splitlines()))
+    track(path)
+    told = capsys.readouterr().err
+    assert told.startswith(
+        f"{path}: no standard deviations (`mu_s_std`): 1 % of mu_s is taken, and learned from"
+    )
+    assert told.count("\n") == 1
+
+
 def test_other_faults(tmp_path):
     with pytest.raises(SeriesError, match="cannot be read"):
         track(tmp_path / "none.csv")
