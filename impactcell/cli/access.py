@@ -5,7 +5,9 @@ import shlex
 import sys
 from pathlib import Path
 
-from impactcell.cli.paths import check_directory
+from cryptography import x509
+
+from impactcell.cli.paths import check_directory, check_output
 from impactcell.errors import AccessError
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
 from impactcell.opcua.host_interface import Role
@@ -42,11 +44,12 @@ def add_user(file: Path, name: str, role: str = "observer", certificate: Path | 
         raise AccessError(f"{role!r} is not a role; choose one of {', '.join(roles)}")
     if not name.strip() or not name.isprintable():
         raise AccessError("a user needs a name that can be printed")
+    check_output(file, AccessError)  # before anybody is asked for a password
     users = read_users(file)
     before = users.get(name)
     user = User(name, roles[role.lower()], before.password if before is not None else None)
     if certificate is not None:
-        print_ = fingerprint(der(read_certificate(certificate)))
+        print_ = fingerprint(der(_client_certificate(certificate)))
         user = User(name, user.role, user.password, print_)
     else:
         user = with_password(user, _ask_password(name))
@@ -54,6 +57,16 @@ def add_user(file: Path, name: str, role: str = "observer", certificate: Path | 
     write_users(file, users)
     verb = "changed" if before is not None else "added"
     print_result(f"{name} {verb} as {user.role.name.lower()} in {file}")
+
+
+def _client_certificate(file: Path) -> x509.Certificate:
+    try:
+        return read_certificate(file)
+    except AccessError as error:
+        raise AccessError(
+            f"{error}; name the client's certificate (.der, .pem or .crt): it exports it, or it lies in the "
+            "`rejected` folder of the server's certificates once the client has tried to connect"
+        ) from error
 
 
 def _ask_password(name: str) -> str:
@@ -136,12 +149,13 @@ def trust_cert(file: Path, pki: Path | None = None) -> None:
     AccessError
         `file` is no certificate, or it is not clear which trust list is meant.
     """
-    certificate = read_certificate(file)
+    certificate = _client_certificate(file)
     inferred = file.resolve().parent
     if pki is None:
         if inferred.name != "rejected" or not (inferred.parent / "trusted").is_dir():
             raise AccessError(f"{file}: is in no `rejected` folder; say with --pki which list is meant")
         pki = inferred.parent
+    check_directory(pki, AccessError)
     target = pki / "trusted" / f"{thumbprint(der(certificate))}.der"
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -122,7 +122,9 @@ class CellSpace:
         for reference in self._space[parent].references:
             if reference.ReferenceTypeId == ua.NodeId(reference_type) and reference.BrowseName == browse_name:
                 return reference.NodeId
-        raise LookupError(f"the NodeSet2 file has no {name}")
+        raise LookupError(
+            f"ImpactCell.NodeSet2.xml has no {name}; write it anew with `python -m impactcell.scada.nodeset`"
+        )
 
     def _is_wanted(self, path: str) -> bool:
         """Whether the cell has an optional node: what is known of its machine, some of each condition."""

@@ -76,8 +76,9 @@ def nodeset() -> str:
     for number, (name, *others) in _names(text).items():
         if others:
             raise ValueError(
-                f"{number} is taken by {name} and by {others[0]}; "
-                f"the next free number is {next_free(text, number)}"
+                f"{number} is taken by {name} and by {others[0]}: give the new one another where it is "
+                f"written, a value in impactcell/quantities.py, a condition in impactcell/alarms/rules, all "
+                f"else in {MODEL_FILE.name}.j2; the next free number is {next_free(text, number)}"
             )
     return text
 

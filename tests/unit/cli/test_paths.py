@@ -37,6 +37,23 @@ CELL_ANSWERS = (
         ),
         (("certs", "list", "{dir}/file"), "{dir}/file: is a file; name the directory that holds own"),
         (("certs", "make", "{dir}/file"), "{dir}/file: is a file; name a directory"),
+        (
+            ("users", "add", "{dir}/no/users.yaml", "eva"),
+            "{dir}/no/users.yaml: cannot be written: there is no directory {dir}/no; make it first",
+        ),
+        (("users", "add", "{dir}", "eva"), "{dir}: is a directory; name a file in it"),
+        (
+            ("users", "add", "{dir}/u.yaml", "eva", "--certificate", "{dir}/file"),
+            "{dir}/file: no certificate in PEM or DER; name the client's certificate (.der, .pem or .crt)",
+        ),
+        (
+            ("certs", "trust", "{dir}/file"),
+            "{dir}/file: no certificate in PEM or DER; name the client's certificate (.der, .pem or .crt)",
+        ),
+        (
+            ("certs", "trust", "{dir}/none"),
+            "{dir}/none: No such file or directory; name the client's certificate (.der, .pem or .crt)",
+        ),
         (("init", "{dir}/file", *CELL_ANSWERS), "{dir}/file: is a file; name a directory"),
     ],
 )

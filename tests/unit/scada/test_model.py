@@ -95,6 +95,7 @@ def test_a_number_that_is_taken_is_refused_by_name(
     assert told.startswith(f"{number} is taken by ")
     assert taken_by in told
     assert "ImpactCellType/Model/Another" in told
+    assert "a value in impactcell/quantities.py" in told
     assert told.endswith(f"the next free number is {following}")
     assert "Another" not in MODEL_FILE.read_text(encoding="utf-8")
 
