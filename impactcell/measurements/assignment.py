@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.measurements.gains import SIGNALS
+from impactcell.measurements.moments import unread_moments
 from impactcell.measurements.recognition import (
     CHANNELS,
     ROTATION_WORDS,
@@ -157,7 +158,8 @@ def _no_time(tables: Sequence[Table]) -> str:
             if name_score(column.name, ColumnMeaning.TIME)[0] < WORD_MATCH:
                 continue
             if column.text is not None:
-                return f": {column.name!r} holds text, as {column.text[0][:40]!r}"
+                holds = unread_moments(column.text)[0] or "text"
+                return f": {column.name!r} holds {holds}, as {column.text[0][:40]!r}"
             if not ascends(column.values):
                 steps = np.diff(column.values)
                 return f": {column.name!r} goes forward in {np.sum(steps > 0.0)} of {steps.size} steps only"

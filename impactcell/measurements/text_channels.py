@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from impactcell.measurements.assignment import Assignment
+from impactcell.measurements.moments import unread_moments
 from impactcell.measurements.numbers import is_missing, parse_number
 from impactcell.measurements.recognition import (
     CHANNELS,
@@ -90,6 +91,8 @@ def _fault(table: Table, column: MeasuredColumn, cells: Sequence[str], meaning: 
     if meaning is ColumnMeaning.TIME:
         way = way.removesuffix(", or leave it empty")
         without += " and give the rate with --set rate=10kHz"
+        dates, way_of_dates = unread_moments(cells)
+        holds, way = dates or holds, way_of_dates or way
     return (
         f"{table.place(row)}: column {column.name!r} holds {holds}, as {cells[row][:SHOWN]!r}, where the "
         f"{meaning} is needed; {way}, or {without}"

@@ -2,8 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from datetime import UTC, datetime
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ from impactcell.errors import MeasurementError
 from impactcell.measurements.dialect import DELIMITERS, Dialect, decode, detect, later_lines, split_cells
 from impactcell.measurements.faults import MAX_FAULTS_TOLD
 from impactcell.measurements.limits import Limits
+from impactcell.measurements.moments import read_moments
 from impactcell.measurements.numbers import parse_number
 from impactcell.measurements.table import Lines, MeasuredColumn, Table, unique_names
 from impactcell.measurements.text_layout import Layout, find_layout, is_comment
@@ -234,46 +234,9 @@ def _kept(layout: Layout, columns: list[Samples | list[str]]) -> tuple[MeasuredC
         if isinstance(content, np.ndarray):
             kept.append(MeasuredColumn(names[place], unit, content))
         elif any(content) or layout.names[place]:
-            moments = _moments(content)
+            moments = read_moments(content)
             if moments is None:
                 kept.append(MeasuredColumn(names[place], unit, np.full(len(content), np.nan), tuple(content)))
             else:
                 kept.append(MeasuredColumn(names[place], "s", moments))
     return tuple(kept)
-
-
-_CLOCK = r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,]\d+)?))?"
-_DATES: tuple[tuple[str, Callable[[re.Match[str]], tuple[int, int, int]]], ...] = (
-    (
-        r"(\d{4})-(\d{2})-(\d{2})[T ]+" + _CLOCK + r"(?:Z|[+-]\d{2}:?\d{2})?",
-        lambda m: (int(m[1]), int(m[2]), int(m[3])),
-    ),
-    (r"(\d{1,2})\.(\d{1,2})\.(\d{4}),?[T ]+" + _CLOCK, lambda m: (int(m[3]), int(m[2]), int(m[1]))),
-    (r"()()()" + _CLOCK, lambda _: (1970, 1, 1)),
-)
-"""Writings of a moment, and their year, month and day; a clock alone counts from midnight."""
-
-
-def _moments(cells: list[str]) -> Samples | None:
-    """Seconds from the first of a column of dates or clock times; None where it is none."""
-    for pattern, date in _DATES:
-        compiled = re.compile(pattern)
-        if not compiled.fullmatch(cells[0]):
-            continue
-        seconds = np.full(len(cells), np.nan)
-        for row, cell in enumerate(cells):
-            match = compiled.fullmatch(cell)
-            if match is None:
-                return None
-            try:
-                day = datetime(*date(match), tzinfo=UTC)
-            except ValueError:
-                return None
-            seconds[row] = (
-                day.timestamp()
-                + 3600 * int(match[4])
-                + 60 * int(match[5])
-                + float((match[6] or "0").replace(",", "."))
-            )
-        return np.asarray(np.round(seconds - seconds[0], 9), dtype=np.float64)
-    return None

@@ -90,6 +90,14 @@ FAULTS: Final = (
         "ablegen oder unten im Formular eine Einheit für alle angeben",
     ),
     _Fault(
+        COLUMN
+        + r" holds (?P<dates>dates|days) (?P<what>[a-z ]+), as (?P<cell>.+), where the time is needed; "
+        r"(?P<way>.+), or leave the column out with .*",
+        "column “{column}” holds {dates} {what}, as {cell}; {way}, or choose another time in the form below",
+        "Spalte „{column}“ enthält {dates}, etwa {cell}; {way}, oder unten im Formular eine andere Zeit "
+        "wählen",
+    ),
+    _Fault(
         COLUMN + r" holds text, as (?P<cell>.+), where the (?P<meaning>\w+) is needed; .*",
         "column “{column}” holds text, as {cell}, where the {meaning} is needed; correct the cell, or choose "
         "another column as the {meaning} in the form below",
@@ -166,7 +174,19 @@ FAULTS: Final = (
     ),
 )
 """What `impactcell import` says, as patterns; what the page says in English, and in German."""
+DATES: Final = {
+    "dates": "ein Datum, bei dem Tag und Monat vertauscht sein können",
+    "days": "Tage ohne Uhrzeit",
+    "write them all as 2024-01-31 10:00:00.000": "überall wie 2024-01-31 10:00:00.000 schreiben",
+    "export hours, minutes and fractions of a second with each sample":
+        "zu jedem Messwert Stunden, Minuten und Sekundenbruchteile ausgeben",
+}  # fmt: skip
+"""What keeps dates from being a time, and what to do."""
 REASONS: Final = (
+    (r": '(?P<column>.+)' holds dates of which [a-z ]+, as '(?P<text>.*)'",
+     ": in „{column}“ können Tag und Monat vertauscht sein, etwa „{text}“"),
+    (r": '(?P<column>.+)' holds days without a time of day, as '(?P<text>.*)'",
+     ": „{column}“ enthält Tage ohne Uhrzeit, etwa „{text}“"),
     (r": '(?P<column>.+)' holds text, as '(?P<text>.*)'", ": „{column}“ enthält Text, etwa „{text}“"),
     (r": '(?P<column>.+)' goes forward in (?P<some>\d+) of (?P<all>\d+) steps only",
      ": „{column}“ wächst nur in {some} von {all} Schritten"),
@@ -204,4 +224,5 @@ def _in_german(said: dict[str, str]) -> dict[str, str]:
         "needed": NEEDED.get(needed, needed),
         "reason": page_note(said.get("reason", ""), "de")[1],
         "why": why,
+        **{name: DATES.get(said.get(name, ""), "") for name in ("dates", "way")},
     }
