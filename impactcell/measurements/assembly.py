@@ -10,6 +10,7 @@ import numpy as np
 from impactcell.campaign import COLUMNS, Campaign, Coordinate, Excitation, Sensor
 from impactcell.campaign import write as write_directory
 from impactcell.errors import CampaignError, MeasurementError
+from impactcell.measurements.alike import check_channels_alike, check_scalars_alike, left_empty
 from impactcell.measurements.captures import channel_of, described
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Given, Mapping
@@ -62,10 +63,12 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
         raise MeasurementError("\n".join(mapping.faults))
     given = mapping.given
     records = records_of(tables, mapping)
-    _check_alike(records, mapping)
+    check_channels_alike(records, mapping)
     notes = _said_of(tables, given)
     excitation = given.excitation or _excitation(records, notes)
     _check_channels(records, excitation)
+    check_scalars_alike(tables, mapping, excitation)
+    notes += left_empty(tables, records, mapping)
     coordinate = _coordinate(mapping, excitation)
     if excitation is Excitation.TAP:
         captures, notes_of_taps = taps_of(records, given)
@@ -180,24 +183,6 @@ def _check_channels(records: Sequence[Record], excitation: Excitation) -> None:
         if needed - set(record.values)
     ]
     raise_faults(lacking)
-
-
-def _check_alike(records: Sequence[Record], mapping: Mapping) -> None:
-    """Refuse records without a force or position that others have: it may be there under another name."""
-    faults = []
-    for meaning in (ColumnMeaning.FORCE, ColumnMeaning.POSITION):
-        item = mapping.of(meaning)
-        with_it = next((record for record in records if meaning in record.values), None)
-        if item is None or with_it is None:
-            continue
-        faults += [
-            f"{record.place}: has no {meaning}, which {with_it.place} has as column {item.column!r}; call it "
-            f"so here too, import the files one by one, or leave it out of all with --column "
-            f"'ignored={item.column}'"
-            for record in records
-            if meaning not in record.values
-        ]
-    raise_faults(faults)
 
 
 def _whole(number: int, record: Record, given: Given) -> Capture:

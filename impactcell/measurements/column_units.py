@@ -7,7 +7,7 @@ from impactcell.measurements.assignment import UNITLESS, Assignment, no_unit
 from impactcell.measurements.gains import Gain
 from impactcell.measurements.recognition import ColumnMeaning
 from impactcell.measurements.table import MeasuredColumn, Table
-from impactcell.measurements.units import MeasuredUnit, parse_unit
+from impactcell.measurements.units import Dimension, MeasuredUnit, parse_unit
 
 
 def unit_of(column: MeasuredColumn, units: Mapping[str, str]) -> MeasuredUnit | None:
@@ -41,6 +41,35 @@ def without_unit(
             if measured_unit(unit_of(column, units), item.meaning, gains) is None:
                 faults.setdefault(column.name, f"{table.title}: {no_unit(item)}")
     return list(faults.values())
+
+
+def covariates_without_unit(
+    tables: Sequence[Table], assignments: Sequence[Assignment], units: Mapping[str, str]
+) -> list[str]:
+    """Tell covariates of which one table says the unit and another none that is known."""
+    faults = []
+    for item in assignments:
+        if item.meaning is not ColumnMeaning.COVARIATE or item.column in units:
+            continue
+        known: tuple[str, str] | None = None
+        without = ""
+        for table in tables:
+            column = table.column(item.column)
+            if column is None or column.text is not None:
+                continue
+            unit = None if column.unit is None else parse_unit(column.unit)
+            if unit is None:
+                without = without or table.title
+            elif (unit.dimension, unit.factor) != (Dimension.NONE, 1.0):
+                known = known or (table.title, column.unit or "")
+        if known and without:
+            title, text = known
+            faults.append(
+                f"{without}: column {item.column!r} has no unit that is known, and in {title} it is in "
+                f"{text}; say the unit of all with --unit '{item.column}={text}', or leave the column out "
+                f"with --column 'ignored={item.column}'"
+            )
+    return faults
 
 
 def contrary_units(tables: Sequence[Table], units: Mapping[str, str]) -> list[str]:

@@ -7,7 +7,13 @@ from dataclasses import dataclass, field, replace
 from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError
 from impactcell.measurements.assignment import SURE, Assignment, ascends, changes_within, counts_rows, lacking
-from impactcell.measurements.column_units import contrary_units, measured_unit, unit_of, without_unit
+from impactcell.measurements.column_units import (
+    contrary_units,
+    covariates_without_unit,
+    measured_unit,
+    unit_of,
+    without_unit,
+)
 from impactcell.measurements.gains import Gain
 from impactcell.measurements.recognition import (
     UNIT_ALONE,
@@ -131,6 +137,7 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
     faults += lacking(assignments, given.constants, tables, {meaning for meaning, _ in texts.values()})
     faults += [*_without_use(assignments, given, tables), *_unused_gains(assignments, given, columns)]
     faults += without_unit(tables, assignments, given.units, given.gains)
+    faults += covariates_without_unit(tables, assignments, given.units)
     faults += contrary_units(tables, given.units)
     return Mapping(assignments, given, tuple(faults))
 

@@ -120,6 +120,20 @@ FAULTS: Final = (
         "Dateien einzeln ablegen",
     ),
     _Fault(
+        r"has no (?P<meaning>\w+), which (?P<other>.+) says beside its columns; say it here too, .*",
+        "has no {meaning}, which {other} says beside its columns; say it here too, or give it for all "
+        "shots in the form below",
+        "ohne „{meaning}“, in {other} steht der Wert neben den Spalten; hier auch angeben oder unten im "
+        "Formular für alle Stöße",
+    ),
+    _Fault(
+        COLUMN + r" has no unit that is known, and in (?P<other>.+) it is in (?P<unit>.+); say the unit .*",
+        "column “{column}” has no unit that is known, and in {other} it is in {unit}; give the unit of all "
+        "in the form below",
+        "Spalte „{column}“ hat keine bekannte Einheit, in {other} steht sie in {unit}; unten im Formular "
+        "eine Einheit für alle angeben",
+    ),
+    _Fault(
         r"the times are those of " + COLUMN + r", so that the rate has no use; .*",
         "the times are those of column “{column}”, so that the rate has no use; take it out of the "
         "form below",

@@ -28,6 +28,10 @@ GERMAN: Final = {
         "keine Masse angegeben: sie wird angepasst, zu sehen ist nur Reibung durch Masse",
     r"no inertia is stated: the base model has to say it \(inertia_kg_m2\)":
         "keine Trägheit angegeben: das Grundmodell muss sie nennen (inertia_kg_m2)",
+    r"no mass is stated in (\d+) of (\d+) records, the first (.+): it is left empty there":
+        r"in \1 von \2 Aufzeichnungen ist keine Masse angegeben, zuerst in \3: dort bleibt sie leer",
+    r"column (['\"])(.+)\1 is in (\d+) of (\d+) files only: left empty for the others, the first (.+)":
+        r"Spalte „\2“ steht nur in \3 von \4 Dateien: in den anderen leer, zuerst in \5",
     r"(.+) is (\S+), where about 1 is possible: check the unit of (.+) or (\S+) "
     r"\(off by a factor of about (\S+)\); it will be refused as it stands":
         r"Einheit prüfen: \3 oder \4 (um etwa den Faktor \5 daneben); so wird es später abgelehnt",
