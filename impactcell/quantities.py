@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Final
 
-from impactcell.records import ModuleStatus, Quality, Snapshot
+from impactcell.records import MM_PER_MIN, ModuleStatus, Quality, Snapshot
 from impactcell.records.quantity import DataType, Quantity, Range, Ranges, Unit
 
 FOLDERS: Final[Mapping[str, tuple[int, str]]] = {
@@ -35,7 +35,7 @@ MILLIMETRE: Final = Unit("MMT", "mm", "millimetre", 1e3)
 """1000 to the metre (SI prefix milli)."""
 MICROMETRE: Final = Unit("4H", "µm", "micrometre (micron)", 1e6)
 """1e6 to the metre (SI prefix micro)."""
-MILLIMETRE_PER_MINUTE: Final = Unit("H81", "mm/min", "millimetre per minute", 60e3)
+MILLIMETRE_PER_MINUTE: Final = Unit("H81", "mm/min", "millimetre per minute", 1.0 / MM_PER_MIN)
 """1000 mm in a metre times 60 s in a minute."""
 MILLISECOND: Final = Unit("C26", "ms", "millisecond", 1e3)
 """1000 to the second (SI prefix milli)."""

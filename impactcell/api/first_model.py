@@ -13,6 +13,7 @@ from impactcell.features import Features, extract, impulse_balance
 from impactcell.prediction.contact_onset import fit_plant_and_onset, is_late, onset_sentence
 from impactcell.prediction.plant_fit import PlantFit
 from impactcell.process.console import print_note
+from impactcell.records import MM_PER_MIN
 
 TAPS: Final = 30
 """Taps that a running cell's first model is fitted to at first: k, b and mu_k/mu_s to a per cent or so."""
@@ -137,7 +138,7 @@ def _shortcomings(fit: PlantFit, mass_kg: float) -> list[str]:
         found.append("b is not known well enough; vary the velocity")
     if not prior.ratio_std <= LARGEST_RATIO_ERROR:
         weight_n = mass_kg * plant.gravity_m_s2
-        slow = 6e4 * plant.mu_s * weight_n / max(plant.damping_n_s_per_m, 1.0)
+        slow = plant.mu_s * weight_n / max(plant.damping_n_s_per_m, 1.0) / MM_PER_MIN
         found.append(
             "mu_k/mu_s is not known well enough; strike more taps, slower ones too, which stick "
             f"first: with this part those well below {round(slow, -2):.0f} mm/min"

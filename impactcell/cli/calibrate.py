@@ -14,7 +14,7 @@ from impactcell.prediction import Model
 from impactcell.prediction import calibrate as fit_predictors
 from impactcell.process.console import print_result
 from impactcell.process.progress import progress
-from impactcell.records import Samples
+from impactcell.records import MM_PER_MIN, Samples
 from impactcell.settings import CellConfig, read_cell
 from impactcell.settings.model_file import write_model
 
@@ -76,7 +76,7 @@ def calibrated_model(cell: CellConfig) -> Model:
         )
     swept = (
         f"mu_s {lowest:.4g}-{highest:.4g} ({FRICTIONS} values, mu_k/mu_s {model.ratio:.4g}), "
-        f"v {6e4 * velocities[0]:.5g}-{6e4 * velocities[-1]:.5g} mm/min ({VELOCITIES}), "
+        f"v {velocities[0] / MM_PER_MIN:.5g}-{velocities[-1] / MM_PER_MIN:.5g} mm/min ({VELOCITIES}), "
         f"m {masses[0]:.4g}-{masses[-1]:.4g} kg ({len(masses)}), "
         + ("the actuator halts at separation" if math.isinf(stroke) else f"stroke {1e3 * stroke:.4g} mm")
     )

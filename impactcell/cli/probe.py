@@ -18,7 +18,7 @@ from impactcell.fieldbus.probe import probe as probe_module
 from impactcell.fieldbus.transports import transport_for
 from impactcell.prediction.mass_interpolation import velocity_range_m_s
 from impactcell.process.console import print_result
-from impactcell.records import Capture, Channel
+from impactcell.records import MM_PER_MIN, Capture, Channel
 from impactcell.service.factory import cell_design, module_link
 from impactcell.settings import CellConfig, read_cell
 
@@ -86,9 +86,8 @@ def _tap_rows(capture: Capture) -> Iterator[tuple[str, str]]:
     if capture.time_ns:
         made = f"{datetime.fromtimestamp(1e-9 * capture.time_ns, UTC):%Y-%m-%d %H:%M:%S} UTC"
     mass, stroke = _or_unknown(capture.mass_kg, "kg"), _or_unknown(1e3 * capture.stroke_m, "mm")
-    how = (
-        f"{6e4 * capture.velocity_m_s:.5g} mm/min, {mass}, stroke {stroke}, direction {capture.direction:+d}"
-    )
+    velocity = f"{capture.velocity_m_s / MM_PER_MIN:.5g} mm/min"
+    how = f"{velocity}, {mass}, stroke {stroke}, direction {capture.direction:+d}"
     yield "tap", f"cycle {capture.cycle}, {made}, {how}"
     summary = capture.summary
     force, position = capture.force, capture.position
@@ -112,9 +111,9 @@ def _unlike(cell: CellConfig, capture: Capture) -> Iterator[str]:
     if not predictors:
         return
     mass_kg = capture.mass_kg if math.isfinite(capture.mass_kg) else predictors[0].mass_kg
-    slowest, fastest = (6e4 * velocity for velocity in velocity_range_m_s(cell.model, mass_kg))
+    slowest, fastest = (velocity / MM_PER_MIN for velocity in velocity_range_m_s(cell.model, mass_kg))
     for name, value, low, high, unit in (
-        ("velocity", 6e4 * abs(capture.velocity_m_s), slowest, fastest, "mm/min"),
+        ("velocity", abs(capture.velocity_m_s) / MM_PER_MIN, slowest, fastest, "mm/min"),
         ("mass", capture.mass_kg, predictors[0].mass_kg, predictors[-1].mass_kg, "kg"),
     ):
         if math.isfinite(value) and not low * (1.0 - ROUNDING) <= value <= high * (1.0 + ROUNDING):

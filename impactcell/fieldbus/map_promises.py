@@ -5,6 +5,7 @@ from typing import Final
 
 from impactcell.fieldbus.register_types import SI_FACTOR
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.records import MM_PER_MIN
 
 _WITHOUT: Final = {
     "ring_cycle": "one cycle is held: those made while it is not read are lost, and counted",
@@ -28,7 +29,7 @@ _ONLY_FIGURES: Final = (
 )
 
 
-_STEP_NOT_SEEN_M_S: Final = 2.0 / 6e4
+_STEP_NOT_SEEN_M_S: Final = 2.0 * MM_PER_MIN
 """Steps of the velocity above which their rounding is told, m/s: half of one is 5e-4 of a slow tap of
 2000 mm/min, and a force of 100 N shows its scale to 2e-4 (noise of 0.5 N, a thousand samples). Our choice."""
 
@@ -85,9 +86,9 @@ def _of_velocity(registers: RegisterMap) -> Iterator[str]:
     step_m_s = velocity.scale * SI_FACTOR.get(velocity.unit, 1.0)
     if step_m_s > _STEP_NOT_SEEN_M_S:
         yield (
-            f"register velocity goes in steps of {6e4 * step_m_s:.3g} mm/min: k, b, mu_k/mu_s and mu_s err "
-            "by what is rounded off, beyond their ±; finer steps, or a commanded velocity that is a whole "
-            "number of them, avoid it"
+            f"register velocity goes in steps of {step_m_s / MM_PER_MIN:.3g} mm/min: k, b, mu_k/mu_s and "
+            "mu_s err by what is rounded off, beyond their ±; finer steps, or a commanded velocity that is a "
+            "whole number of them, avoid it"
         )
 
 

@@ -5,6 +5,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from impactcell.records import MM_PER_MIN
+
 WIRE: Final = np.dtype(">u2")
 """One register as Modbus carries it."""
 
@@ -23,7 +25,7 @@ SI_FACTOR: Final[Mapping[str, float]] = {
     "nm": 1e-9,
     "m/s": 1.0,
     "mm/s": 1e-3,
-    "mm/min": 1e-3 / 60.0,
+    "mm/min": MM_PER_MIN,
     "N": 1.0,
     "mN": 1e-3,
     "kN": 1e3,

@@ -21,7 +21,7 @@ from impactcell.measurements.table import Table
 from impactcell.measurements.taps import taps_of
 from impactcell.measurements.units import Dimension
 from impactcell.quality import Fault, inspect_campaign, notes_of, refuse_unusable
-from impactcell.records import Capture, Channel, Samples
+from impactcell.records import MM_PER_MIN, Capture, Channel, Samples
 
 STANDARD_GRAVITY_M_S2 = 9.81
 """Acceleration of free fall where nothing is given; the campaign format's own default."""
@@ -136,7 +136,10 @@ def _said_of(tables: Sequence[Table], given: Given) -> list[str]:
     """Tell what was read of mass and velocity beside the columns, where nothing else was given."""
     said = [said_beside(table) for table in tables]
     told = []
-    for meaning, factor, unit in ((ColumnMeaning.MASS, 1.0, "kg"), (ColumnMeaning.VELOCITY, 6e4, "mm/min")):
+    for meaning, factor, unit in (
+        (ColumnMeaning.MASS, 1.0, "kg"),
+        (ColumnMeaning.VELOCITY, 1.0 / MM_PER_MIN, "mm/min"),
+    ):
         if str(meaning) in given.constants:
             continue
         values = [value for of in said if isinstance(value := of.get(meaning), float)]

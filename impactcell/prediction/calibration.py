@@ -23,7 +23,7 @@ from impactcell.prediction.model import (
     Sensitivity,
     printed_predictor,
 )
-from impactcell.records import Samples
+from impactcell.records import MM_PER_MIN, Samples
 
 REGIME_GRID = 41
 """Velocities at which the regime is told: a regime's end is known to a fortieth of the range. Our choice."""
@@ -230,12 +230,12 @@ def calibrate(
     if not predictors:
         told = (
             f"no part of {masses_kg[0]:.4g}-{masses_kg[-1]:.4g} kg slides free of the actuator between "
-            f"{6e4 * velocities_m_s[0]:.4g} and {6e4 * velocities_m_s[-1]:.4g} mm/min"
+            f"{velocities_m_s[0] / MM_PER_MIN:.4g} and {velocities_m_s[-1] / MM_PER_MIN:.4g} mm/min"
         )
         deceleration = plant.mu_k * plant.gravity_m_s2
         longest_m = float(velocities_m_s[-1]) ** 2 / deceleration
         if tap.stroke_m > longest_m and math.isfinite(tap.stroke_m):
-            fast = 6e4 * math.sqrt(tap.stroke_m * deceleration)
+            fast = math.sqrt(tap.stroke_m * deceleration) / MM_PER_MIN
             raise PredictionError(
                 f"{told}: it catches up with the part; tap from about {round(fast, -3):.0f} mm/min on, or "
                 f"with a stroke of less than about {1e3 * longest_m:.2g} mm"

@@ -14,7 +14,7 @@ from impactcell.errors import NegativeRootError, PredictionError
 from impactcell.features import MeasuredFeature
 from impactcell.prediction.mass_interpolation import MassInterpolation
 from impactcell.prediction.model import Model, Predictor, Sensitivity
-from impactcell.records import Capture, Coefficient, Quality
+from impactcell.records import MM_PER_MIN, Capture, Coefficient, Quality
 
 MIN_MU_S = 1e-3
 """Least mu_s that (5) is solved for: a part without friction. Our choice."""
@@ -169,8 +169,8 @@ def out_of_range(
     slowest, fastest = mixed.velocity_range_m_s
     if not slowest * (1 - 1e-9) <= velocity_m_s <= fastest * (1 + 1e-9):
         reasons.append(
-            f"velocity {6e4 * velocity_m_s:.5g} mm/min is outside the calibrated "
-            f"{6e4 * slowest:.5g}-{6e4 * fastest:.5g} mm/min"
+            f"velocity {velocity_m_s / MM_PER_MIN:.5g} mm/min is outside the calibrated "
+            f"{slowest / MM_PER_MIN:.5g}-{fastest / MM_PER_MIN:.5g} mm/min"
         )
     low = max(predictor.mu_s_range[0] for _, predictor in mixed.parts)
     high = min(predictor.mu_s_range[1] for _, predictor in mixed.parts)
@@ -194,7 +194,7 @@ def beyond_calibration(model: Model, capture: Capture, mu_s: float) -> str:
     reasons = []
     for name, value, ends, unit, scale in (
         ("mass", capture.mass_kg, masses, " kg", 1.0),
-        ("velocity", capture.velocity_m_s, velocities, " mm/min", 6e4),
+        ("velocity", capture.velocity_m_s, velocities, " mm/min", 1.0 / MM_PER_MIN),
         ("mu_s", mu_s, frictions, "", 1.0),
     ):
         low, high = min(ends), max(ends)

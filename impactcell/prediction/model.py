@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from impactcell.physics import Plant
+from impactcell.records import MM_PER_MIN
 
 REFERENCE_VELOCITY = 0.1
 """Velocity in m/s (6000 mm/min) at which the terms of equation (5) are stated, so that they are in metres."""
@@ -145,12 +146,12 @@ def printed_predictor() -> Predictor:
     Units are not printed; they come out as v in mm/min, F_p in N and d in µm. The range is that over
     which the paper reports its errors.
     """
-    per_mm_per_min = REFERENCE_VELOCITY * 60_000.0
+    per_mm_per_min = REFERENCE_VELOCITY / MM_PER_MIN
     return Predictor(
         mass_kg=18.9,
         mu_s_range=(0.15, 0.25),
         velocity_range_m_s=(0.05, 0.1),
-        force=ForceForm(friction_n=146.2, velocity_n_s_per_m=0.0529 * 60_000.0),
+        force=ForceForm(friction_n=146.2, velocity_n_s_per_m=0.0529 / MM_PER_MIN),
         distance=DistanceForm(
             limit=0.3415,
             square_m=0.07379 * per_mm_per_min**1.6428 * 1e-6,

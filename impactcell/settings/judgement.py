@@ -18,6 +18,7 @@ from impactcell.journal.store import Journal
 from impactcell.prediction.mass_interpolation import velocity_range_m_s
 from impactcell.process import yaml_loader
 from impactcell.process.yaml_loader import FilePosition
+from impactcell.records import MM_PER_MIN
 from impactcell.scada.users import read_users
 from impactcell.settings.cells import CellConfig
 from impactcell.settings.plausible_tap import doubted_values, immovable
@@ -149,18 +150,21 @@ def _of_predictors(cell: CellConfig, calibrate: str) -> Iterator[_Remark]:
         )
     limit = settings.actuator.max_velocity_mm_per_min
     slowest, fastest = velocity_range_m_s(cell.model, mass_kg or lightest)
-    if limit < slowest * 60e3 * (1.0 - 1e-9):
+    if limit < slowest / MM_PER_MIN * (1.0 - 1e-9):
         yield _Remark(
             ("actuator", "max_velocity_mm_per_min"),
-            f"taps are at most {limit:g} mm/min, the model is calibrated for {slowest * 60e3:g} to "
-            f"{fastest * 60e3:g} mm/min; {calibrate}",
+            f"taps are at most {limit:g} mm/min, the model is calibrated for {slowest / MM_PER_MIN:g} to "
+            f"{fastest / MM_PER_MIN:g} mm/min; {calibrate}",
         )
 
 
 def _of_sensors(cell: CellConfig) -> Iterator[_Remark]:
     """Say where the noise of a sensor was never said, cannot be, or is larger in recorded taps."""
     sensors, plant = cell.settings.sensors, cell.model.plant
-    velocity, mass_kg = cell.settings.actuator.max_velocity_mm_per_min / 60e3, cell.settings.part.mass_kg
+    velocity, mass_kg = (
+        cell.settings.actuator.max_velocity_mm_per_min * MM_PER_MIN,
+        cell.settings.part.mass_kg,
+    )
     # of a tap without losses: all of m v²/2 in the contact's spring, and then into friction
     peak_n = velocity * math.sqrt(plant.stiffness_n_per_m * (mass_kg or math.inf))
     slide_um = 1e6 * velocity**2 / (2.0 * plant.mu_k * plant.gravity_m_s2)

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from impactcell.records import MM_PER_MIN
 from impactcell.settings.cells import CellConfig
 
 
@@ -45,7 +46,9 @@ class PlausibleRange:
 
 MASS: Final = PlausibleRange("a mass", "kg", 0.01, 1e3, {"g": 1e-3, "t": 1e3})
 STROKE: Final = PlausibleRange("a stroke", "mm", 0.01, 100.0, {"m": 1e3, "µm": 1e-3})
-VELOCITY: Final = PlausibleRange("a velocity", "mm/min", 60.0, 6e4, {"mm/s": 60.0, "m/min": 1e3, "m/s": 6e4})
+VELOCITY: Final = PlausibleRange(
+    "a velocity", "mm/min", 60.0, 6e4, {"mm/s": 60.0, "m/min": 1e3, "m/s": 1.0 / MM_PER_MIN}
+)
 STIFFNESS: Final = PlausibleRange("a stiffness", "N/m", 1e4, 1e9, {"N/mm": 1e3, "N/µm": 1e6})
 DAMPING: Final = PlausibleRange("a damping", "N s/m", 1.0, 1e5, {"N s/mm": 1e3, "N s/µm": 1e6})
 FRICTION: Final = PlausibleRange("a friction coefficient", "", 0.01, 1.5, {"%": 0.01})
@@ -88,7 +91,7 @@ def immovable(cell: CellConfig) -> str:
     stroke_m = 1e-3 * (settings.actuator.stroke_mm or math.nan)
     if math.isnan(stroke_m):
         stroke_m = constants.get("stroke", math.nan)
-    velocity_m_s = settings.actuator.max_velocity_mm_per_min / 60e3
+    velocity_m_s = settings.actuator.max_velocity_mm_per_min * MM_PER_MIN
     pushes_n = plant.stiffness_n_per_m * stroke_m + plant.damping_n_s_per_m * velocity_m_s
     holds_n = plant.mu_s * mass_kg * plant.gravity_m_s2
     if not pushes_n < holds_n:
