@@ -184,6 +184,12 @@ CYCLE: Final[tuple[Quantity[Snapshot], ...]] = (
     _Q("Signature/Spe", 6067, "Squared prediction error, in units of the noise.",
        ("Not explained by them (SPE)", "Von ihnen nicht erklärt (SPE)"),
        lambda s: s.signature.spe, None, ONE, _up_to(1e6), column="spe"),
+    _Q("Signature/TSquaredLimit", 6106, "TSquared from which on it makes a cycle deviant by itself.",
+       ("T² that by itself is deviant", "T², ab dem es allein abweicht"),
+       lambda s: s.signature.t_squared_limit, None, ONE, _up_to(1e6)),
+    _Q("Signature/SpeLimit", 6109, "Spe from which on it makes a cycle deviant by itself.",
+       ("SPE that by itself is deviant", "SPE, ab dem es allein abweicht"),
+       lambda s: s.signature.spe_limit, None, ONE, _up_to(1e6)),
 
     _Q("Positioning/Target", 6070, "Where the part is to go, along +1.",
        ("Target", "Ziel"),

@@ -132,6 +132,9 @@ class Signature:
         nan while the reference is being learned.
     deviates_at_m : float
         Where along the stroke the deviation is largest; nan without a deviation.
+    t_squared_limit, spe_limit : float
+        From where on each of them makes a cycle deviant whatever the others say; a shape that is looked for
+        can do so below both.
     """
 
     position_m: Samples
@@ -142,3 +145,5 @@ class Signature:
     deviates_at_m: float
     quality: Quality
     reason: str = ""
+    t_squared_limit: float = float("nan")
+    spe_limit: float = float("nan")

@@ -108,6 +108,12 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
     "Shows the alarm to people again.": "Zeigt die Meldung wieder.",
     "Size of the last shift between batches.": "Größe des letzten Sprungs zwischen Chargen.",
     "Squared prediction error, in units of the noise.": "Quadrierter Restfehler, in Einheiten des Rauschens.",
+    "TSquared from which on it makes a cycle deviant by itself.": (
+        "TSquared, ab dem es allein einen Zyklus abweichend macht."
+    ),
+    "Spe from which on it makes a cycle deviant by itself.": (
+        "Spe, ab dem es allein einen Zyklus abweichend macht."
+    ),
     "Starts a positioning task.": "Beginnt eine Positionieraufgabe.",
     "Static friction at the reference batch, filtered over cycles.": (
         "Haftreibung bei der Bezugscharge, über Zyklen gefiltert."

@@ -17,7 +17,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtrc, fdtrc
+from scipy.special import chdtrc, chdtri, fdtrc, fdtri
 
 from impactcell.numerics import small_linalg
 from impactcell.numerics.jit import compiled
@@ -62,6 +62,8 @@ class DeviationTest:
     t_squared, spe : float
     spe_freedom : int
         Degrees of freedom of `spe`.
+    spe_scale : float
+        What normal cycles have of it over its freedom, where that is certain to be above 1.
     kind : str
         Which part of the test says most.
     at_m : float
@@ -76,6 +78,7 @@ class DeviationTest:
     t_squared: float
     spe: float
     spe_freedom: int
+    spe_scale: float
     kind: str
     at_m: float
     size: float
@@ -103,7 +106,7 @@ def test_deviation(
     if p_value < SIZED_P_VALUE:
         family = likeliest - 2 if likeliest >= 2 else deviation_size.BUMP
         size, std = deviation_size.estimate_size(family, P, u, grid_m, slide.reached_m, least, score_variance)
-    return DeviationTest(p_value, t_squared, spe, freedom, KINDS[likeliest], at, size, std)
+    return DeviationTest(p_value, t_squared, spe, freedom, scale, KINDS[likeliest], at, size, std)
 
 
 @compiled
@@ -225,3 +228,17 @@ def _hotelling_p_value(t_squared: float, cycles: int) -> float:
     if n <= k + 1:
         return 1.0
     return float(fdtrc(k, n - k, t_squared * (n - k) / (k * (n - 1.0))))
+
+
+def limits(test: DeviationTest, cycles: int, false_alarm_cycles: float) -> tuple[float, float]:
+    """Give the T^2 and the SPE from which on each makes a cycle deviant by itself; nan where none can.
+
+    The inverse of each p-value at its share of the false alarms: there w / p reaches `false_alarm_cycles`.
+    """
+    n, k = cycles, COMPONENTS
+    by_t_squared, by_spe = (share / false_alarm_cycles for share in FALSE_ALARM_SHARES[:2])
+    t_squared = (
+        float(fdtri(k, n - k, 1.0 - by_t_squared)) * k * (n - 1.0) / (n - k) if n > k + 1 else math.nan
+    )
+    spe = test.spe_scale * float(chdtri(test.spe_freedom, by_spe)) if test.spe_freedom > 0 else math.nan
+    return t_squared, spe

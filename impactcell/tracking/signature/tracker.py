@@ -143,7 +143,8 @@ def update(
     test = deviation_test.test_deviation(state.reference, information, grid)
     is_deviant = test.p_value < 1.0 / settings.false_alarm_cycles
     at_m = test.at_m if is_deviant else math.nan
-    signature = Signature(grid, friction, std, test.t_squared, test.spe, at_m, Quality.GOOD)
+    limits = deviation_test.limits(test, state.reference.variation.cycles, settings.false_alarm_cycles)
+    signature = Signature(grid, friction, std, test.t_squared, test.spe, at_m, Quality.GOOD, "", *limits)
     cycle = features.capture.cycle
     evidence = _evidence(settings, test, cycle, conditions.period_s) if is_deviant else None
     return SignatureResult(
