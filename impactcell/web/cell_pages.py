@@ -78,7 +78,7 @@ async def trend(context: PageContext, request: Request, _: BrowserSession) -> Re
     if span not in SPANS_S:
         return JSONResponse({"error": f"span is one of {', '.join(SPANS_S)}"}, 400)
     if facts.journal is None:
-        return JSONResponse({"error": "no journal"}, 404)
+        return Response(status_code=204)
     try:
         columns = await context.past.trend(facts.journal, span)
     except JournalError:

@@ -158,7 +158,10 @@ class CellView:
         """Give what a card shows: every published value, and why some are not good."""
         content: dict[str, Any] = {
             "freshness": self.freshness.value,
-            "link_reason": "" if self.status.connected else self.status.reason,
+            "link_reason": {
+                language: Messages(language).link_fault("" if self.status.connected else self.status.reason)
+                for language in LANGUAGES
+            },
         }
         values, qualities = _published(MODULE, self.status)
         if self.snapshot is not None:
@@ -245,6 +248,7 @@ def _beside_values(snapshot: Snapshot) -> dict[str, Any]:
     reasons = {
         "mu_s": snapshot.friction.mu_s.reason,
         "wear": snapshot.wear.reason,
+        "batch": snapshot.batch.reason,
         "signature": snapshot.signature.reason,
         "positioning": snapshot.positioning.reason,
     }

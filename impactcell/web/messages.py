@@ -14,6 +14,7 @@ from impactcell.german.findings import (
     german_headline,
     german_texts,
 )
+from impactcell.german.link_faults import german_link_fault
 from impactcell.german.parameters import parameter_words
 from impactcell.physics.effect_names import as_title, in_words
 from impactcell.records import Alarm
@@ -87,16 +88,21 @@ class Messages:
         evidence, is_probability = alarm.evidence, RULES[alarm.name].is_probability
         if math.isnan(evidence.statistic):
             return ""
-        statistic, threshold = (
-            f"{percent_sure(value)[self._index]} %" if is_probability else self.number(value, 3)
-            for value in (evidence.statistic, evidence.threshold)
-        )
+        if is_probability:
+            statistic = f"{percent_sure(evidence.statistic)[self._index]} %"
+            threshold = f"{self.number(100.0 * evidence.threshold, 5)} %"
+        else:
+            statistic, threshold = self.number(evidence.statistic, 3), self.number(evidence.threshold, 3)
         said = f"{self['probability' if is_probability else 'statistic']} {statistic}"
         return said if math.isnan(evidence.threshold) else f"{said}, {self['threshold']} {threshold}"
 
     def published_reason(self, reason: str) -> str:
         """Say why a value is uncertain or missing."""
         return german_reason(reason) if self.language == "de" else english_reason(reason)
+
+    def link_fault(self, reason: str) -> str:
+        """Say why a module does not answer."""
+        return german_link_fault(reason) if self.language == "de" else reason
 
     def refusal(self, code: str) -> str:
         """Say why something was not done, by OPC UA's name of it; what an address makes up is not repeated.

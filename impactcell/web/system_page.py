@@ -54,6 +54,7 @@ async def system(context: PageContext, request: Request, session: BrowserSession
         users=users,
         certificates=certificates,
         viewers=context.feed.viewers,
+        now_ns=context.now_ms() * 1_000_000,
     )
 
 

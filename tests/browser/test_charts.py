@@ -66,6 +66,39 @@ def test_a_band_breaks_off_where_either_edge_has_no_value(charts: Browser) -> No
         assert charts.driver.execute_async_script(DRAW, *edges, without(1.2)) == drawn, (low, high)
 
 
+LABELS = """
+    const [width, data, options, done] = arguments;
+    document.getElementById("chart").style.width = `${width}px`;
+    const series = [{ colour: "band", width: 1 }, { colour: "band", width: 1 }];
+    const other = new Chart(document.getElementById("chart"), { unit: "N", xUnit: "ms", series, ...options });
+    other.show(data);
+    requestAnimationFrame(() => {
+        done(other.plot.axes.map((axis) => axis._values));
+        other.clear("");
+    });
+"""
+
+
+@pytest.mark.parametrize(
+    "span_s", [60, 100, 180, 400, 1000, 3600, 8 * 3600, 5 * 86_400, 30 * 86_400], ids=str
+)
+def test_a_trend_as_wide_as_a_phone_has_its_times(charts: Browser, span_s: int) -> None:
+    times = [1.8e9 + 7.0, 1.8e9 + 7.0 + span_s]
+    labels, _ = charts.driver.execute_async_script(LABELS, 320, [times, [1, 2], [2, 3]], {"time": True})
+    assert 2 <= len(labels) <= 6
+    assert len(set(labels)) == len(labels)
+
+
+def test_the_labels_of_an_axis_have_as_many_decimals_as_its_steps(charts: Browser) -> None:
+    _, labels = charts.driver.execute_async_script(LABELS, 600, [[0, 1], [0.195, 0.25], [0.2, 0.265]], {})
+    assert labels == ["0.20", "0.22", "0.24", "0.26"]
+    for size in (1e-7, 1e-3, 1.0, 1e6):
+        _, labels = charts.driver.execute_async_script(
+            LABELS, 600, [[0, 1], [0, size], [size, 1.1 * size]], {}
+        )
+        assert len(set(labels)) == len(labels) > 2
+
+
 WORD = """
     const [curve, marks, done] = arguments;
     chart.show([curve.map((_, x) => x), curve, curve, curve], marks);

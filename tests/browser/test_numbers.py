@@ -80,6 +80,14 @@ def test_cycles_that_are_left_are_whole_ones_and_the_same_everywhere(browser: Br
         assert browser.run(SHOW, f"Wear/CyclesToLimit{path}", "cycles", content) == part
 
 
+def test_cycles_left_are_not_said_where_wear_is_not_known(browser: Browser) -> None:
+    load(browser, "en")
+    unknown = {"Wear/Level": None, "Wear/Limit": 0.25, "Wear/CyclesToLimit": None}
+    assert browser.run("return cyclesLeft(arguments[0])", unknown) == "–"
+    flat = unknown | {"Wear/Level": 0.2, "Wear/CyclesToLimitLow": None}
+    assert browser.run("return cyclesLeft(arguments[0])", flat) == "limit is not being approached"
+
+
 @pytest.mark.parametrize(
     ("language", "said"),
     [

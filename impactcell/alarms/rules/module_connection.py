@@ -1,6 +1,7 @@
 """ModuleConnection: the module that measures does not answer."""
 
 from impactcell.alarms.rule import AlarmRule, ConditionClass, Message, RuleResult, RuleSettings
+from impactcell.german.link_faults import german_link_fault
 
 NAME = "ModuleConnection"
 """Published name."""
@@ -11,7 +12,7 @@ def result(reason: str, *, connected: bool) -> RuleResult:
     message = Message(
         f"The module does not answer, no cycles come in: {reason}. "
         "Check its power, its network cable and its address.",
-        f"Das Modul antwortet nicht, es kommen keine Zyklen an: {reason}. "
+        f"Das Modul antwortet nicht, es kommen keine Zyklen an: {german_link_fault(reason)}. "
         "Stromversorgung, Netzwerkkabel und Adresse prüfen.",
     )
     return RuleResult(NAME, not connected, message)

@@ -7,6 +7,7 @@ const root = document.querySelector(".cell"), cell = root.dataset.cell;
 // A band of one value at each x is nothing but its edges.
 const edges = [{ colour: "edge", width: 1.5 }, { colour: "edge", width: 1.5 }];
 const tapSeries = [...edges, { colour: "curve", width: 1.5 }, { colour: "curve", width: 1.5 }];
+const millimetres = (value) => (value === null ? "–" : value.toLocaleString(document.documentElement.lang, { minimumFractionDigits: 3, maximumFractionDigits: 3 }));
 const place = (id) => document.getElementById(id);
 let limit = null, past = null, span = "hour", lastTrend = 0, charts = null, waiting = null;
 
@@ -35,7 +36,9 @@ function showDetail(detail) {
     const s = detail.signature, none = s.x.map(() => null);
     const edge = (sign) => s.low.map((value, i) => (value === null || s.std[i] === null ? null : value + sign * TOLD_STDS * s.std[i]));
     const deviant = detail.deviant?.friction.length === s.x.length ? detail.deviant : null;
-    charts.signature.show([s.x, s.usual_low ?? none, s.usual_high ?? none, s.low, edge(1), edge(-1), deviant?.friction ?? none],
+    const curves = [s.low, s.usual_low ?? none, s.usual_high ?? none, deviant?.friction ?? none];
+    if (curves.every((curve) => curve.every((value) => value === null))) charts.signature.clear(texts.not_recorded);
+    else charts.signature.show([s.x, s.usual_low ?? none, s.usual_high ?? none, s.low, edge(1), edge(-1), deviant?.friction ?? none],
       deviant ? [{ x: deviant.at, text: `▼ ${texts.cycle} ${deviant.cycle} ${texts.deviates}`, colour: "bad" }] : []);
   }
   const table = place("taps");
@@ -43,7 +46,7 @@ function showDetail(detail) {
   table.hidden = detail.taps.length === 0;
   table.tBodies[0].replaceChildren(...detail.taps.slice().reverse().map((tap) => {
     const row = document.createElement("tr");
-    for (const text of [number(tap.cycle, 10), withUnit(tap.velocity, "mm/min"), withUnit(tap.remaining, "mm")]) row.insertCell().textContent = text;
+    for (const text of [number(tap.cycle, 10), number(tap.velocity), millimetres(tap.remaining)]) row.insertCell().textContent = text;
     return row;
   }));
 }
@@ -66,6 +69,8 @@ function showCard(card) {
     estimator: texts[card.estimator],
     mass: withUnit(card.mass, "kg"),
     signature_reason: reasons.signature,
+    wear_reason: reasons.wear,
+    batch_reason: reasons.batch,
     positioning_reason: values["Positioning/Target"] === null ? texts.no_task : reasons.positioning,
     gap_meaning: gap === null ? "" : texts[gap < 1.5 ? "at_noise" : "above_noise"],
   };
@@ -80,7 +85,7 @@ async function loadTrend() {
   const asked = span;
   const answer = await fetch(`/cells/${encodeURIComponent(cell)}/trend?span=${asked}`).catch(() => null);
   if (!answer || asked !== span) return;
-  if (answer.status === 404) return charts.trend.clear(texts.no_past);
+  if (answer.status === 204) return charts.trend.clear(texts.no_past);
   if (!answer.ok) return;
   past = await answer.json();
   drawTrend();

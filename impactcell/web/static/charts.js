@@ -46,6 +46,9 @@ function drawMarks(plot, marks) {
   ctx.restore();
 }
 
+// Steps of a time axis, s; also those between uPlot's own, which leave a narrow chart without a label.
+const TIME_STEPS = [1, 2, 5, 10, 15, 20, 30, ...[1, 2, 3, 5, 10, 15, 20, 30].map((m) => 60 * m), ...[1, 2, 3, 4, 6, 12].map((h) => 3600 * h), ...[1, 2, 3, 5, 7, 10, 14].map((d) => 86400 * d)];
+
 /** A chart in an element. `show` takes columns [x, band low, band high, line, ...]; series are described once. */
 export class Chart {
   constructor(element, { unit, xUnit, time = false, band = [1, 2], series, include = [] }) {
@@ -81,12 +84,18 @@ export class Chart {
     this.plot?.destroy();
     this.element.textContent = "";
     const axis = { stroke: colour("soft"), grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("grid"), width: 1 }, labelSize: 18, labelFont: "12px system-ui, sans-serif" };
-    const numbers = new Intl.NumberFormat(document.documentElement.lang, { maximumSignificantDigits: 6 });
-    const format = (_, values) => values.map((value) => (value === null ? "" : numbers.format(value)));
     const lang = document.documentElement.lang, clock = { hour: "2-digit", minute: "2-digit", hourCycle: "h23" };
     const times = (_, splits, axis, space, step) => {
       const form = new Intl.DateTimeFormat(lang, step >= 86400 ? { day: "numeric", month: "short" } : step >= 60 ? clock : { ...clock, second: "2-digit" });
       return splits.map((seconds) => form.format(new Date(seconds * 1e3)));
+    };
+    // All labels of an axis have as many decimals as its steps need: 0.20 beside 0.22.
+    const format = (_, values, axis, space, step) => {
+      const isWhole = (value) => Math.abs(value - Math.round(value)) < 1e-6 * value;
+      let decimals = 0;
+      while (decimals < 12 && !isWhole(step * 10 ** decimals)) decimals++;
+      const numbers = new Intl.NumberFormat(lang, { minimumFractionDigits: decimals, maximumFractionDigits: decimals });
+      return values.map((value) => (value === null ? "" : numbers.format(value)));
     };
     const range = (plot, low, high) => {
       const values = [low, high, ...this.marks.map((mark) => mark.y)].filter((value) => Number.isFinite(value));
@@ -100,7 +109,7 @@ export class Chart {
       scales: { x: { time: this.time }, y: { range } },
       legend: { show: false },
       cursor: { drag: { x: true, y: false }, points: { size: 6 } },
-      axes: [{ ...axis, size: this.time ? 44 : 50, ...(this.time ? { values: times, space: 80 } : { label: this.xUnit, values: format }) }, { ...axis, size: 64, label: this.unit, values: format }],
+      axes: [{ ...axis, size: this.time ? 44 : 50, ...(this.time ? { values: times, space: 58, incrs: TIME_STEPS } : { label: this.xUnit, values: format }) }, { ...axis, size: 64, label: this.unit, values: format }],
       series: [{}, ...this.series.map((s) => ({
         stroke: s.colour ? colour(s.colour) : "transparent", width: s.width ?? 0, dash: s.dash,
         points: { show: false }, spanGaps: false,

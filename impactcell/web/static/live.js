@@ -60,7 +60,7 @@ export function showState(root, card) {
   for (const place of root.querySelectorAll('[data-field="state"]')) {
     place.className = `state ${{ live: "good", waiting: "plain", stale: "warn", lost: "bad" }[kind]}`;
     place.textContent = `${sign} ${texts[kind]}`;
-    place.title = card.link_reason;
+    place.title = card.link_reason[language];
   }
 }
 export const hasCycle = (card) => card.time_ms !== undefined;
@@ -68,7 +68,8 @@ export const hasCycle = (card) => card.time_ms !== undefined;
 export function cyclesLeft(values) {
   const level = values["Wear/Level"], limit = values["Wear/Limit"], cycles = values["Wear/CyclesToLimit"];
   const low = values["Wear/CyclesToLimitLow"], high = values["Wear/CyclesToLimitHigh"];
-  if (level !== null && limit !== null && level > limit) return texts.passed;
+  if (level === null) return "–"; // not known, which is not the same as a limit that is out of sight
+  if (limit !== null && level > limit) return texts.passed;
   if (cycles === null) return texts.not_reached;
   const range = low === null ? "" : ` (${texts.from} ${wholeCycles(low)}${high === null ? "" : ` ${texts.to} ${wholeCycles(high)}`})`;
   return `${wholeCycles(cycles)}${range}`;
@@ -81,7 +82,8 @@ export function showFriction(root, card) {
   set(root, "mu_s", std === null ? coefficient(mu_s) : beside(std, mu_s));
   set(root, "mu_s_band", std === null ? "" : toldStd(std));
   set(root, "mu_s_quality", kind === "good" ? "" : `${texts[kind]}: ${card.reasons[language].mu_s}`);
-  set(root, "wear", `${coefficient(level)} / ${coefficient(values["Wear/Limit"])}`);
+  const wear = quality(card, "Wear/Level"), doubt = level === null || wear === "good" ? "" : ` (${texts[wear]})`;
+  set(root, "wear", `${coefficient(level)} / ${coefficient(values["Wear/Limit"])}${doubt}`);
   for (const meter of root.querySelectorAll('[data-field="wear_meter"]')) {
     // Red from the limit on, amber from nine tenths of it: a value beyond `high` is far from an optimum below `low`.
     Object.assign(meter, { max: limit, value: level ?? 0, low: 0.9 * limit, high: 0.999 * limit, optimum: 0 });

@@ -1,4 +1,5 @@
 // A card a cell.
+import { moment } from "./frame.js";
 import { follow, hasCycle, isOpen, number, set, showAlarm, showFriction, showState, texts } from "./live.js";
 
 const SHOWN = 120; // cycles of the small curve; the service remembers as many
@@ -52,6 +53,7 @@ follow("/live", {
     if (curve.length > SHOWN) curve.shift();
     showFriction(root, card);
     set(root, "cycle", number(cycle, 10));
+    set(root, "cycle_time", moment(card.time_ms));
     spark(root.querySelector(".spark"), curve);
     root.dataset.cycle = cycle;
   },

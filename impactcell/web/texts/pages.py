@@ -57,7 +57,7 @@ PAGE_TEXTS: Texts = {
     "cycles_left": ("Cycles left", "Zyklen übrig"),
     "batch": ("Batch", "Charge"),
     "cycle": ("Cycle", "Zyklus"),
-    "velocity": ("Tap velocity", "Stoßgeschwindigkeit"),
+    "velocity": ("Velocity", "Geschwindigkeit"),
     "mass": ("Mass", "Masse"),
     "estimator": ("Estimated from", "Geschätzt aus"),
     "folder_Friction": ("Friction of the last cycle", "Reibung des letzten Zyklus"),
@@ -177,6 +177,8 @@ PAGE_TEXTS: Texts = {
     ),
     "alarms_changed": ("The alarms have changed: show them", "Die Alarme haben sich geändert: anzeigen"),
     # system
+    "as_of": ("As of", "Stand:"),
+    "connected": ("module answers", "Modul antwortet"),
     "module": ("Module", "Modul"),
     "address": ("Address", "Adresse"),
     "received": ("Cycles received", "Zyklen empfangen"),
