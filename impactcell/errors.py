@@ -3,35 +3,35 @@
 ::
 
     ImpactCellError
-    ├── SettingsError             a cell, map, model or scenario file: file:line:column and the way out
+    ├── SettingsError             a cell, map, model or scenario file: file:line:column
     ├── CampaignError             a campaign directory: file, line and the way out
-    ├── MeasurementError          a measurement file that cannot be imported: file, line or column
-    ├── EffectError               an effect of the user's own that cannot be used: file and the way out
-    ├── SeriesError               a series for `impactcell track`: file, line and the way out
+    ├── MeasurementError          a measurement file: file, line or column
+    ├── EffectError               an effect of the user's own: file and the way out
+    ├── SeriesError               a series for `impactcell track`: file and line
     ├── PhysicsError              the plant model cannot answer
     │   ├── NoBreakawayError      the part never moved
     │   ├── NoSeparationError     the part never left the actuator
-    │   └── NoStopError           the part was still moving at the end of the allowed time
+    │   └── NoStopError           it was still moving at the end of the allowed time
     ├── PredictionError           a capture cannot be turned into a coefficient
     │   ├── CaptureError          empty, constant, not finite or without a contact
     │   ├── ClippedForceError     the force channel is saturated where it is needed
     │   ├── NegativeRootError     equation (5) has no real root at this distance
     │   └── NotConvergedError     the waveform fit did not reach a minimum
-    ├── PositioningError          a target or command that is refused; nothing has been commanded
+    ├── PositioningError          target or command refused; nothing has been commanded
     ├── DiscrepancyError          the workflow cannot give an answer from these data
     ├── FieldbusError
-    │   ├── MapError              a register map that overlaps itself or leaves the register space
+    │   ├── MapError              a map that overlaps itself or leaves the registers
     │   ├── WrongDeviceError      identity or map version is not what the cell file says
-    │   ├── LinkError             not connected, lost, or no answer in time          (retry)
-    │   ├── ProtocolError         the peer broke the protocol; nothing of it is used  (retry)
+    │   ├── LinkError             not connected, lost, or no answer in time (retry)
+    │   ├── ProtocolError         the peer broke the protocol; nothing used (retry)
     │   │   └── NotDecimalError   a decimal code with a digit above 9
-    │   └── ModbusExceptionError  the peer refused a request, with its exception code (retry)
+    │   └── ModbusExceptionError  the peer refused a request, with its code (retry)
     ├── JournalError
-    │   ├── ForeignJournalError   not our file, or of another version; never overwritten
-    │   ├── JournalDamagedError   what is stored is not what was written (retry: it is put aside)
-    │   ├── JournalGoneError      the file was removed or replaced while it was in use (retry)
-    │   └── JournalUnavailableError  the file cannot be opened or written now         (retry)
-    │       └── JournalFullError     ... for the disk, or a quota, is full            (retry)
+    │   ├── ForeignJournalError   not ours, or of another version; never overwritten
+    │   ├── JournalDamagedError   not what was written (retry: it is put aside)
+    │   ├── JournalGoneError      the file was removed or replaced in use (retry)
+    │   └── JournalUnavailableError  the file cannot be opened or written now (retry)
+    │       └── JournalFullError     ... for the disk, or a quota, is full    (retry)
     └── AccessError               users, certificates and rights of the OPC UA server
 
 `retry` says whether doing the same again can help. A message names the cell, the thing and the way out.

@@ -155,6 +155,12 @@ def along_stroke(figure: "Figure") -> None:
     axes[1].plot(
         list(normal), [s.t_squared for s in normal.values()], "^", color=GREEN, markersize=3, label="T²"
     )
+    for name, limit, colour, style in (
+        ("SPE", "spe_limit", BLUE, "--"),
+        ("T²", "t_squared_limit", GREEN, "-."),
+    ):
+        at = [getattr(s, limit) for s in normal.values()]
+        axes[1].plot(list(normal), at, style, color=colour, linewidth=0.8, label=f"{name}, its own limit")
     axes[1].set(xlabel="cycle", ylabel="statistic", yscale="log", title="judging each cycle")
     _legends(axes)
 

@@ -51,7 +51,8 @@ async def server(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Page
     need_chromium()
     directory: Path = tmp_path_factory.mktemp("page")
     users = directory / "users.yaml"
-    write_users(users, {"olga": User("olga", Role.OBSERVER, password="x")})
+    write_users(users, {"otto": User("otto", Role.OPERATOR, password="x")})
+    (directory / "studies").write_text("no directory: nothing can be stored in it")
     settings = PageSettings("http://127.0.0.1:0", users, directory / "pki", directory / "studies")
     cells = [
         CellFacts(name, "10.0.0.9:502", "", has_positioning=name == PLACING) for name in (UNKNOWN, PLACING)
@@ -80,7 +81,7 @@ async def server(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Page
 def enter(browser: Browser, server: PageServer) -> None:
     browser.show_as("dark", PHONE)
     browser.open(f"{server.endpoint}/login?lang=de")
-    browser.log_in("olga", PASSWORD)
+    browser.log_in("otto", PASSWORD)
     browser.find(f'[data-cell="{UNKNOWN}"][data-cycle]')
 
 
@@ -130,3 +131,20 @@ async def test_a_module_that_answers_is_not_called_live(server: PageServer, brow
     assert "Modul antwortet" in text
     assert "silent: 10.0.0.8:502 Gerät 1: keine Verbindung innerhalb von 0,5 s" in text
     assert "Stand: " in text
+
+
+async def test_a_file_that_is_not_taken_says_why(
+    server: PageServer, browser: Browser, tmp_path: Path
+) -> None:
+    table = tmp_path / "stoss.csv"
+    table.write_text("t;F\n0;1\n")
+
+    def drop() -> None:
+        enter(browser, server)
+        browser.open(f"{server.endpoint}/studies")
+        browser.find("input[type=file]").send_keys(str(table))
+        browser.find("#drop-form button").click()
+        said = lambda: browser.find("#drop-note").text == "Auf der Platte ist kein Platz dafür."  # noqa: E731
+        browser.until(said, "why it was not taken")
+
+    await asyncio.to_thread(drop)

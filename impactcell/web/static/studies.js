@@ -25,6 +25,13 @@ function put(id, file, progress) {
   });
 }
 
+/** Why a study could not be begun: the sentence of the page that came in its place. */
+async function refusal(answer) {
+  if (answer.status === 401) return texts.offline;
+  const said = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("main .panel p");
+  return said?.firstChild?.textContent.trim() || texts.upload_refused;
+}
+
 async function send(files) {
   if (!files.length || isSending) return;
   isSending = true;
@@ -35,7 +42,7 @@ async function send(files) {
   try {
     const title = files.length === 1 ? files[0].name : `${files[0].name} + ${files.length - 1}`;
     const answer = await post("/studies", { cell: form.elements.cell.value, title });
-    if (answer.status !== 201) throw new Error(answer.status === 401 ? texts.offline : texts.upload_refused);
+    if (answer.status !== 201) throw new Error(await refusal(answer));
     id = (await answer.json()).id;
     for (const file of files) {
       say(`${texts.uploading} ${file.name}`);
