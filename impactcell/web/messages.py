@@ -170,6 +170,23 @@ class Messages:
             text = f"{float(text):.0f}"
         return text.replace(".", ",") if self.language == "de" else text
 
+    def written(self, quantity: str) -> str:
+        """Write a quantity that has a decimal point as this language writes it.
+
+        >>> Messages("de").written("18.9 kg")
+        '18,9 kg'
+        """
+        return quantity.replace(".", ",") if self.language == "de" else quantity
+
+    def understood(self, quantity: str) -> str:
+        """Read a quantity as this language writes it; a comma that is no decimal mark stays, and is refused.
+
+        >>> Messages("de").understood("18,9 kg"), Messages("en").understood("18,900 kg")
+        ('18.9 kg', '18,900 kg')
+        """
+        is_decimal = self.language == "de" and quantity.count(",") == 1 and "." not in quantity
+        return quantity.replace(",", ".") if is_decimal else quantity
+
     def size(self, length: int) -> str:
         """Write the length of a file.
 

@@ -9,6 +9,7 @@ from starlette.responses import FileResponse, JSONResponse, RedirectResponse, Re
 
 from impactcell.german.findings import REPORTS
 from impactcell.scada import RefusedError, Role
+from impactcell.web.messages import Messages
 from impactcell.web.page_context import PageContext
 from impactcell.web.requests import RequestRefusedError
 from impactcell.web.sessions import BrowserSession
@@ -85,7 +86,14 @@ async def read(context: PageContext, request: Request, _: BrowserSession, form: 
     study = _study(context, request)
     if study.is_working or not study.files:
         raise RequestRefusedError(409, "error_study_stage")
-    chosen = {name: value.strip() for name, value in form.items() if name != "csrf"}
+    messages = Messages(context.language(request))
+    chosen = {
+        name: messages.understood(value.strip())
+        if name.startswith("set.") or name == "trigger"
+        else value.strip()
+        for name, value in form.items()
+        if name != "csrf"
+    }
     if chosen:  # nothing is chosen yet where it is read for the first time
         study.choices = {name: value for name, value in chosen.items() if value}
     _enqueue_allowed(context)

@@ -267,6 +267,27 @@ async def test_faults_of_a_verb_are_shown_with_their_rows(page: Page, verbs: Ver
     assert verbs.asked[-1][-3:] == ["--column=force=a", "--unit=a=kN", "--set=mass=2 kg"]
 
 
+@pytest.mark.parametrize(
+    ("language", "typed", "understood"),
+    [("de", "18,9 kg", "18.9 kg"), ("de", "18.9 kg", "18.9 kg"), ("en", "18,900 kg", "18,900 kg")],
+)
+async def test_a_mass_is_read_as_the_language_of_the_page_writes_it(
+    page: Page, verbs: Verbs, language: str, typed: str, understood: str
+) -> None:
+    columns = [{"column": "Zeit, ms", "quantity": "time", "unit": "ms", "why": "?", "confidence": 0.2}]
+    verbs.outcomes["import"] = VerbOutcome(2, json.dumps({"columns": columns, "faults": ["no mass"]}), ())
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, _ = await drop(client, "run.csv", b"t;F\n0;1\n")
+        await until(page, study, Stage.CONFIRMING)
+        choices = {"csrf": await csrf_of(client), "set.mass": typed, "column.time": "Zeit, ms"}
+        await client.post(f"/studies/{study}/read?lang={language}", data=choices)
+        await until(page, study, Stage.CONFIRMING)
+        text = (await client.get(f"/studies/{study}?lang={language}")).text
+    assert verbs.asked[-1][-2:] == [f"--set=mass={understood}", "--column=time=Zeit, ms"]
+    assert f'name="set.mass" value="{"18,9 kg" if language == "de" else typed}"' in text
+    assert f'placeholder="{"18,9 kg" if language == "de" else "18.9 kg"}"' in text
+
+
 async def test_ten_at_once_are_done_one_after_the_other(page: Page, verbs: Verbs) -> None:
     verbs.held = asyncio.Event()
     async with page.logged_in(Role.OPERATOR) as client:
