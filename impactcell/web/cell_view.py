@@ -43,6 +43,7 @@ class _Tap:
     force: Curve | None
     position: Curve | None
     signature: Curve
+    is_deviant: bool
 
 
 def to_json(value: object) -> bytes:
@@ -143,6 +144,7 @@ class CellView:
                 None if force is None or not len(force.values) else decimate(force),
                 None if position is None or not len(position.values) else decimate(position),
                 Curve(signature.position_m, signature.friction, signature.friction),
+                math.isfinite(signature.deviates_at_m),
             )
         )
 
@@ -175,8 +177,10 @@ class CellView:
         content: dict[str, Any] = {"taps": list(self._positioning), "deviant": self._deviant}
         if self._taps and self.snapshot is not None:
             tap, earlier = self._taps[-1], list(self._taps)[:-1]
-            alike = [
-                t for t in earlier if math.isclose(t.velocity_m_s, tap.velocity_m_s, rel_tol=SAME_VELOCITY)
+            alike = [  # what a deviant cycle did is not usual
+                t
+                for t in earlier
+                if not t.is_deviant and math.isclose(t.velocity_m_s, tap.velocity_m_s, rel_tol=SAME_VELOCITY)
             ]
             content["usual_taps"] = len(alike)
             content["force"] = _compared(tap.force, (t.force for t in alike), 1e3, 1.0)

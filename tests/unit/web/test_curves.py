@@ -1,12 +1,18 @@
 """Curves of a screen's width: no peak is lost, and a band is where most curves are."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from impactcell.records import Channel
+from impactcell.web.cell_view import CellView
 from impactcell.web.curves import Curve, decimate, envelope
+from impactcell.web.interface import CellNews
+from tests.snapshots import make_capture, make_snapshot
 
 
 @given(st.integers(1, 5000), st.integers(2, 400), st.integers(0, 2**32 - 1))
@@ -39,3 +45,19 @@ def test_a_band_is_where_most_curves_are() -> None:
     assert band.high[:3].tolist() == [3.0] * 3
     assert np.isnan(band.low[3:]).all()
     assert envelope([], x) is None
+
+
+def test_a_deviant_cycle_is_not_in_the_band_of_the_usual_ones() -> None:
+    view = CellView("press-1")
+    for number in range(1, 7):
+        capture = make_capture(number)
+        snapshot = make_snapshot(capture)
+        if number == 4:
+            odd = snapshot.signature
+            odd = replace(odd, friction=odd.friction + 0.1, deviates_at_m=1e-3)
+            snapshot = replace(snapshot, signature=odd)
+        view.take(CellNews("press-1", snapshot, capture))
+    detail = json.loads(view.encode("detail"))
+    assert detail["usual_taps"] == 4
+    assert max(detail["signature"]["usual_high"]) == pytest.approx(0.15)
+    assert detail["deviant"]["cycle"] == 4
