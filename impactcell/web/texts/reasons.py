@@ -3,6 +3,8 @@
 import re
 from typing import Final
 
+from impactcell.web.texts.tap_reasons import TAP_REASONS
+
 OUTSIDE: Final = re.compile(
     r"(mass|velocity|mu_s) (\S+)( \S+)? is outside the calibrated (\S+?)-(\S+?)( \S+)?", re.ASCII
 )
@@ -59,6 +61,7 @@ GERMAN: Final = {
         r"der Vergleich wird noch gelernt, \1 weitere Zyklen",
     r"aborted by (.+)": r"abgebrochen von \1",
     r"in place": "am Ziel",
+    **TAP_REASONS,
 }  # fmt: skip
 """Reasons of which a value goes on being shown, as patterns; what is in none of them stays English."""
 WORDS: Final = {"force": "Kraft", "position": "Position"}

@@ -1,5 +1,6 @@
 """Published reasons are said in German where the page speaks German."""
 
+import ast
 import json
 import math
 from dataclasses import replace
@@ -8,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import impactcell
 from impactcell.measurements import guess, make_campaign, read_tables
 from impactcell.prediction.equations import beyond_calibration
 from impactcell.tracking.wear_batch import initial_state
@@ -21,6 +23,7 @@ from tests.snapshots import make_capture, make_snapshot
 from tests.unit.measurements.records import taps, write_logger_file
 from tests.unit.prediction.test_estimate import GOOD, MODEL
 
+PACKAGE = Path(impactcell.__file__).parent
 ENGLISH = {
     "is",
     "the",
@@ -111,3 +114,52 @@ def test_what_import_notes_of_taps_is_said_in_german(tmp_path: Path) -> None:
     assert {language for language, _ in said} == {"de"}, said
     assert ("de", "die Zeilen neben den Spalten sagen: Masse 18,9 kg, Geschwindigkeit 3000 mm/min") in said
     assert not any("--" in page_note(note, language)[1] for note in notes for language in ("en", "de"))
+
+
+SAID_BY = (
+    "features/channels",
+    "features/contact",
+    "features/segment",
+    "features/slide",
+    "prediction/equations",
+    "prediction/free_slide_friction",
+    "prediction/mass_interpolation",
+    "prediction/waveform",
+)
+"""Modules whose errors become the reason of a coefficient."""
+PLACEHOLDERS = {"name": "force", "model.name!r": "'own'", "fault": "the part did not slide"}
+
+
+def sample(message: ast.expr) -> list[str]:
+    """What a message may say, with something in the place of each placeholder."""
+    if isinstance(message, ast.IfExp):
+        return [*sample(message.body), *sample(message.orelse)]
+    if isinstance(message, ast.Constant):
+        return [str(message.value)]
+    assert isinstance(message, ast.JoinedStr)
+    parts = []
+    for part in message.values:
+        if isinstance(part, ast.FormattedValue):
+            name = ast.unparse(part.value) + ("!r" if part.conversion == ord("r") else "")
+            parts.append(PLACEHOLDERS.get(name, "12"))
+        else:
+            parts.append(str(ast.literal_eval(part)))
+    return ["".join(parts)]
+
+
+def tap_messages() -> list[str]:
+    found = []
+    for module in SAID_BY:
+        tree = ast.parse((PACKAGE / f"{module}.py").read_text(encoding="utf-8"))
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Raise) and isinstance(node.exc, ast.Call) and node.exc.args:
+                found += sample(node.exc.args[0])
+    return found
+
+
+@pytest.mark.parametrize("english", [*tap_messages(), f"no waveform estimate: {tap_messages()[0]}"])
+def test_why_a_tap_shows_no_friction_is_said_in_german(english: str) -> None:
+    german = german_reason(english)
+    for part, said in zip(english.split("; "), german.split("; "), strict=True):
+        assert part != said, f"say it in impactcell/web/texts/tap_reasons.py: {part}"
+    assert not words(german) & (ENGLISH | {"part", "samples", "record", "slide", "did", "check"}), german
