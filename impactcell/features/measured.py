@@ -1,6 +1,10 @@
 """A feature of a capture as measured."""
 
 from dataclasses import dataclass
+from typing import Final
+
+SEEN_STDS: Final = 3.0
+"""Standard deviations above nought from which a figure is no noise about it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,3 +19,8 @@ class MeasuredFeature:
 
     value: float
     std: float
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether it is above nought by more than its noise."""
+        return self.value > SEEN_STDS * self.std

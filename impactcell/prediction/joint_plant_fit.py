@@ -39,7 +39,7 @@ from impactcell.prediction.phase_reweighting import (
     std_factors,
 )
 from impactcell.prediction.plant_fit import PlantFit
-from impactcell.prediction.waveform import SHOWN_STDS, fit
+from impactcell.prediction.waveform import fit
 from impactcell.records import Samples
 
 MIN_MU_K = 1e-3
@@ -144,9 +144,9 @@ def fit_plant(taps: Sequence[Features], gravity_m_s2: float, name: str = "fitted
 def _initial_frictions(taps: Sequence[Features], gravity_m_s2: float) -> list[float]:
     """Give mu_k of each tap by its slide; where that is too short to show any, that of the other taps."""
     slowing = [required(tap.slide).deceleration for tap in taps]
-    shown = [one.value for one in slowing if one.value > SHOWN_STDS * one.std]
-    usual = float(np.median(shown)) if shown else 0.0
-    found = [one.value if one.value > SHOWN_STDS * one.std or not shown else usual for one in slowing]
+    seen = [one.value for one in slowing if one.is_seen]
+    usual = float(np.median(seen)) if seen else math.nan
+    found = [one.value if one.is_seen or not seen else usual for one in slowing]
     return [max(value / gravity_m_s2, MIN_MU_K) for value in found]
 
 

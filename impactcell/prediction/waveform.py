@@ -45,8 +45,6 @@ MAX_MISFIT = 4.0
 """Misfit of blocks from which on the waveform is not believed at all."""
 SURELY_OVERCOME = 0.8
 """Share of a tap's largest force below which static friction surely was, noise and all. Our choice."""
-SHOWN_STDS = 3.0
-"""Of its standard deviations, above which a deceleration says how large friction is."""
 LARGEST_STD = 3.0
 """Standard deviation of ln mu from which on, a factor of twenty, a tap says nothing of friction."""
 REWEIGHTING_ROUNDS = 3
@@ -131,10 +129,9 @@ def fit(features: Features, model: Model) -> WaveformFit:
     theta = prior.mean.copy()
     if not (capture.mass_kg > 0.0 and capture.velocity_m_s > 0.0):
         raise CaptureError("the part's mass or the actuator's velocity is not known")
-    slowing = deceleration_friction(model, capture.mass_kg, slide)
-    if not slide.deceleration.value > SHOWN_STDS * slide.deceleration.std:
-        slowing = model.plant.mu_k
-    theta[MU_K] = math.log(max(min(slowing, _friction_overcome(features, model)), 1e-3))
+    is_seen = slide.deceleration.is_seen
+    mu_k = deceleration_friction(model, capture.mass_kg, slide) if is_seen else model.plant.mu_k
+    theta[MU_K] = math.log(max(min(mu_k, _friction_overcome(features, model)), 1e-3))
     try:
         return _fit(features, model.plant, prior, theta)
     except PhysicsError as fault:

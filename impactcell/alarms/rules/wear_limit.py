@@ -45,14 +45,14 @@ def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
 
 def told_level(wear: WearState) -> tuple[str, str]:
     """Write the level and its band in both languages, and what all cycles share where that is more."""
-    band = f"{plus_minus(wear.level, wear.level_std, '.4f')} (95 %)"
-    band_in_german = f"{german(wear.level, '.4f', wear.level_std)} (95 %)"
-    if not wear.level_common_std > wear.level_std:
-        return band, band_in_german
-    common = TOLD_STDS * wear.level_common_std
+    common, common_in_german = "", ""
+    if wear.level_common_std > wear.level_std:
+        told = TOLD_STDS * wear.level_common_std
+        common = f"; ± {told:.4f} more, alike in all cycles"
+        common_in_german = f"; dazu ± {german(told, '.4f')}, in allen Zyklen gleich"
     return (
-        f"{band[:-1]}; ± {common:.4f} more, alike in all cycles)",
-        f"{band_in_german[:-1]}; dazu ± {german(common, '.4f')}, in allen Zyklen gleich)",
+        f"{plus_minus(wear.level, wear.level_std, '.4f')} (95 %{common})",
+        f"{german(wear.level, '.4f', wear.level_std)} (95 %{common_in_german})",
     )
 
 

@@ -63,7 +63,7 @@ GERMAN: Final = {
     r"in place": "am Ziel",
     **TAP_REASONS,
 }  # fmt: skip
-"""Reasons of which a value goes on being shown, as patterns; what is in none of them stays English."""
+"""Why a value is doubted, and why a tap shows none, as patterns; what is in none of them stays English."""
 WORDS: Final = {"force": "Kraft", "position": "Position"}
 
 
