@@ -19,8 +19,9 @@ from impactcell.discrepancy.model import (
     ParameterEstimate,
     Problem,
     decided_blocks,
-    estimate_parameters,
+    join_intervals,
     linearise,
+    profile_parameters,
     refit_shot_parameters,
 )
 from impactcell.discrepancy.nominal_model import nominal_models, problem_of
@@ -43,6 +44,7 @@ from impactcell.discrepancy.search import (
     Validation,
     conclude,
     describe_gap,
+    estimate_beside_error,
     exchanged,
     missing_shots,
     nested_models,
@@ -73,8 +75,9 @@ class DiscrepancyResult:
         The same with the held-out shots' own factors.
     parameters : tuple of ParameterEstimate
         Of the final model.
-    effect_parameters : tuple of ParameterEstimate
-        Of its effects, beside a free form of what remains, if anything does.
+    stated_parameters : tuple of ParameterEstimate
+        The same as the report states them: those of its effects beside a free form of what remains, if
+        anything does, and with intervals that hold also for every model that is tied with it.
     law : LawFinding or None
         Where something remains, the law that may be missing; None where nothing does, or nothing can be said.
     """
@@ -93,7 +96,7 @@ class DiscrepancyResult:
     held_final: Fit
     selection: SelectionResult
     parameters: tuple[ParameterEstimate, ...]
-    effect_parameters: tuple[ParameterEstimate, ...]
+    stated_parameters: tuple[ParameterEstimate, ...]
     validation: Validation
     simulation: Simulation
     unexplained: UnexplainedGap | None
@@ -192,7 +195,14 @@ def investigate(
         measure = GapMeasure(held_problem, floor, outcome.replicates, seed)
         law = find_law((problem, context.coarse, final), measure, outcome.held_final, seed)
     report_step("planning the next experiment")
-    parameters = estimate_parameters(final, linearise(problem, final), shared_error(evidence))
+    parameters = profile_parameters(problem, final, linearise(problem, final), shared_error(evidence))
+    stated = (
+        *(one for one in parameters if not one.effect),
+        *estimate_effects(context, evidence, parameters),
+    )
+    tied = _tied_models(selection, conclusion.established)
+    for _effect, _rival, model in tied:
+        stated = join_intervals(stated, estimate_beside_error(problem, model, prepared))
     return DiscrepancyResult(
         conclusion=conclusion,
         prepared=replace(prepared, notes=(*prepared.notes, *basis.notes_of(final))),
@@ -208,11 +218,11 @@ def investigate(
         held_final=outcome.held_final,
         selection=selection,
         parameters=parameters,
-        effect_parameters=estimate_effects(context, evidence, parameters),
+        stated_parameters=stated,
         validation=outcome.validation,
         simulation=simulate_held_out(held_problem, nominal, final),
         unexplained=describe_gap(problem, selection.nominal) if conclusion.verdict == UNKNOWN else None,
-        experiments=propose_experiments(problem, final, _tied_models(selection, conclusion.established)),
+        experiments=propose_experiments(problem, final, tied),
         law=law,
         seed=seed,
     )

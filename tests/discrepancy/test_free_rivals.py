@@ -50,7 +50,7 @@ def test_an_effect_is_named_and_measured_beside_a_force_of_which_nobody_knows_th
     assert found.validation.gap_after < found.validation.gap_before
     truth = strengths("force_sensor_gain", strength, 600_000)["relative_error"]
     (alone,) = (one for one in found.parameters if one.effect)
-    (beside,) = found.effect_parameters
+    (beside,) = (one for one in found.stated_parameters if one.effect)
     told = result_document(found)["effects"][0]["parameters"]["relative_error"]
     assert told["value"] == pytest.approx(beside.value, rel=1e-5)
     assert beside.low < truth < beside.high

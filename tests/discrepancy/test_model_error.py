@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from impactcell.discrepancy.model.intervals import SharedError, covariance
+from impactcell.discrepancy.model.intervals import SharedError, variances
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.search.model_error import (
     ModelError,
@@ -86,11 +86,12 @@ def test_an_error_that_all_shots_share_widens_intervals_by_its_size() -> None:
     linearisation: Any = SimpleNamespace(
         information=np.array([[float(SHOTS)]]),
         shot_gradient=gradient,
+        mean_squared_residual=1.0,
         shot_information=np.ones((SHOTS, 1, 1)),
     )
     shared = SharedError(np.array([[3.0], [1.0]]), np.array([0.5, 0.0]))
-    widened = covariance(linearisation, shared) - covariance(linearisation)
-    assert widened[0, 0] == pytest.approx(3.0**2 * 0.5 / SHOTS**2)
+    widened = variances(linearisation, shared) - variances(linearisation)
+    assert widened[0] == pytest.approx(3.0**2 * 0.5 / SHOTS**2)
 
 
 def test_a_penalty_adds_to_what_the_shots_know() -> None:
@@ -98,11 +99,32 @@ def test_a_penalty_adds_to_what_the_shots_know() -> None:
     linearisation: Any = SimpleNamespace(
         information=np.array([[float(SHOTS)]]),
         shot_gradient=gradient,
+        mean_squared_residual=1.0,
         shot_information=np.zeros((SHOTS, 1, 1)),
     )
-    free = covariance(linearisation)
-    held = covariance(linearisation, None, np.array([[3.0 * SHOTS]]))
-    assert held[0, 0] == pytest.approx(free[0, 0] / 4.0**2)
+    free = variances(linearisation)
+    held = variances(linearisation, None, np.array([[3.0 * SHOTS]]))
+    assert held[0] == pytest.approx(free[0] / 4.0**2)
+
+
+def _seen_by(shots: int, seed: int) -> float:
+    """Number that so many of 40 shots tell of, over the standard deviation that is stated for it."""
+    seen = np.arange(SHOTS) < shots
+    gradient = np.where(seen, np.random.default_rng(seed).standard_normal(SHOTS), 0.0)
+    off = gradient.sum() / shots
+    linearisation: Any = SimpleNamespace(
+        information=np.array([[float(shots)]]),
+        shot_information=seen.astype(np.float64)[:, None, None],
+        shot_gradient=(gradient - seen * off)[:, None],
+        mean_squared_residual=1.0,
+    )
+    return float(off / np.sqrt(variances(linearisation)[0]))
+
+
+@pytest.mark.parametrize("shots", [1, 2, 4, 40])
+def test_what_few_shots_tell_of_is_as_uncertain_as_their_noise(shots: int) -> None:
+    ratios = np.array([_seen_by(shots, seed) for seed in range(400)])
+    assert np.sqrt(np.mean(ratios**2)) == pytest.approx(1.0, abs=0.15)
 
 
 @pytest.mark.long

@@ -154,6 +154,21 @@ def test_an_exact_confound_is_a_tie_and_says_what_breaks_it() -> None:
     assert "weigh the part" in found.experiments[0].setting
 
 
+def test_intervals_hold_whichever_of_tied_names_is_right() -> None:
+    # Named as a gain, a mass that is off makes the contact look so much softer or stiffer.
+    found = investigated("mass_error", shots=18)
+    assert found.added == ("force_sensor_gain",)
+    job = study.Job("single", ("mass_error",), 3, STRENGTH, shots=18)
+    truth = study.scenario(job).plant.stiffness_n_per_m
+    alone, stated = found.parameters[0], found.stated_parameters[0]
+    assert not alone.low <= truth <= alone.high
+    assert stated.low <= truth <= stated.high
+    assert stated.value == alone.value
+    assert result_document(found)["nominal"]["stiffness_n_per_m"]["ci95"] == pytest.approx(
+        [stated.low, stated.high], rel=1e-5
+    )
+
+
 @pytest.mark.long
 def test_an_exact_confound_beside_a_second_effect_is_a_tie_too() -> None:
     hidden = ("batch_shift", "force_sensor_gain")

@@ -34,6 +34,7 @@ from impactcell.discrepancy.model.parameters import (
 )
 from impactcell.discrepancy.model.phase_of_samples import phase_positions, sample_phases, trajectory_of
 from impactcell.discrepancy.model.problem import FitState, Problem, remove_jumps
+from impactcell.discrepancy.model.profile import join_intervals, profile_parameters
 from impactcell.discrepancy.model.shot_fits import normal_equations
 from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
 from impactcell.discrepancy.model.told_settings import (
@@ -75,10 +76,12 @@ __all__ = [
     "fit_split",
     "implausible_notes",
     "is_plausible",
+    "join_intervals",
     "linearise",
     "normal_equations",
     "parameter_name",
     "phase_positions",
+    "profile_parameters",
     "promised_fall",
     "refit_shot_parameters",
     "remove_jumps",

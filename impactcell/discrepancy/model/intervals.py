@@ -15,6 +15,9 @@ CONFIDENCE_LEVEL = 0.95
 MAX_LEVERAGE = 0.98
 """Share of a shot's leverage that is taken out of its score, so that none divides by zero."""
 
+SHOTS_OF_NOISE = 4.0
+"""Shots that the variance by noise alone counts as, beside those that show what they scatter by."""
+
 
 @dataclass(frozen=True, slots=True)
 class ParameterEstimate:
@@ -51,31 +54,37 @@ class SharedError:
     variance: Samples
 
 
-def covariance(
+def variances(
     linearisation: LinearisedFit, shared_error: SharedError | None = None, penalty: Samples | None = None
 ) -> Samples:
-    """Covariance of the shared coordinates, shape (p, p).
+    """Variance of each shared coordinate, shape (p,).
 
-    H^-1 (sum u_i u_i') H^-1 n/(n - p), with the leverage of every shot taken out of its own score
-    (Bell and McCaffrey 2002), since with some forty shots the plain sandwich is too narrow. What all shots
-    have in common does not scatter between them: with shapes s_q of variance c_q it adds sum c_q s_q s_q' to
-    the middle. A penalty theta' P theta, shape (p, p), adds P to H.
+    The diagonal of H^-1 (sum u_i u_i') H^-1, with the leverage of every shot taken out of its own score
+    (Bell and McCaffrey 2002), since with some forty shots the plain sandwich is too narrow. What few shots
+    tell of has few such scores, and of a single shot the score is nought: with w_i the part of shot i in the
+    variance that noise alone gives, they are worth (sum w_i)^2 / sum w_i^2 shots. So the variance is
+    drawn towards that which noise alone gives, at the level of the residuals where that is above one, as if
+    `SHOTS_OF_NOISE` more shots had shown it (Smyth 2004). What all shots have in common does not scatter
+    between them: shapes s_q of variance c_q add sum c_q (H^-1 s_q)^2. A penalty theta' P theta, shape (p, p),
+    adds P to H.
     """
     H = linearisation.information if penalty is None else linearisation.information + penalty
     n, p = linearisation.shot_gradient.shape
     scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
     inverse = np.linalg.pinv(H / np.outer(scale, scale), rcond=1e-12, hermitian=True) / np.outer(scale, scale)
-    meat = np.zeros((p, p))
+    between_shots, parts = np.zeros(p), np.zeros((n, p))
     for i in range(n):
         share = linearisation.shot_information[i] @ inverse
-        corrected = np.linalg.lstsq(
-            np.eye(p) - MAX_LEVERAGE * share, linearisation.shot_gradient[i], rcond=None
-        )[0]
-        meat += np.outer(corrected, corrected)
+        score = np.linalg.lstsq(np.eye(p) - MAX_LEVERAGE * share, linearisation.shot_gradient[i], rcond=None)
+        between_shots += (inverse @ score[0]) ** 2
+        parts[i] = np.einsum("ab,ba->a", inverse, share)
+    noise = parts.sum(0)
+    shots = 1.0 / np.maximum(((parts / np.maximum(noise, 1e-300)) ** 2).sum(0), 1.0 / n)
+    level = max(linearisation.mean_squared_residual, 1.0)
+    variance = (shots * between_shots + SHOTS_OF_NOISE * level * noise) / (shots + SHOTS_OF_NOISE)
     if shared_error is not None:
-        meat += (shared_error.shapes.T * shared_error.variance) @ shared_error.shapes
-    sandwich: Samples = inverse @ meat @ inverse
-    return sandwich
+        variance += shared_error.variance @ (shared_error.shapes @ inverse) ** 2
+    return np.asarray(variance)
 
 
 def estimate_parameters(
@@ -84,14 +93,9 @@ def estimate_parameters(
     shared_error: SharedError | None = None,
     penalty: Samples | None = None,
 ) -> tuple[ParameterEstimate, ...]:
-    """Every shared parameter with its interval; a penalty is that of the fit, shape (p, p).
-
-    Penalised coordinates take no degree of freedom: a shot has many more samples than they are.
-    """
-    shots = len(linearisation.bounds) - 1
-    spread = np.sqrt(np.maximum(np.diag(covariance(linearisation, shared_error, penalty)), 0.0))
-    numbers = len(fit.theta) if penalty is None else int((np.diag(penalty) == 0.0).sum())
-    quantile = float(student.ppf(0.5 + 0.5 * CONFIDENCE_LEVEL, max(shots - numbers, 2)))
+    """Every shared parameter with its interval; a penalty is that of the fit, shape (p, p)."""
+    spread = np.sqrt(variances(linearisation, shared_error, penalty))
+    quantile = interval_quantile(fit, linearisation, penalty)
     parameter_estimates = []
     for coordinate, theta, std in zip(fit.coordinates, fit.theta, spread, strict=True):
         half = float(quantile * std)
@@ -112,6 +116,16 @@ def estimate_parameters(
             )
         )
     return tuple(parameter_estimates)
+
+
+def interval_quantile(fit: Fit, linearisation: LinearisedFit, penalty: Samples | None = None) -> float:
+    """Half of an interval over the standard deviation: Student's t of as many shots as no parameter takes.
+
+    Penalised coordinates take none: a shot has many more samples than they are.
+    """
+    numbers = len(fit.theta) if penalty is None else int((np.diag(penalty) == 0.0).sum())
+    shots = len(linearisation.bounds) - 1
+    return float(student.ppf(0.5 + 0.5 * CONFIDENCE_LEVEL, max(shots - numbers, 2)))
 
 
 def _clipped_value(coordinate: Coordinate, theta: float) -> float:

@@ -163,6 +163,7 @@ def fit(
             state = gauss_newton(problem, state, most_steps, tolerance)
             if state.cost > before - POLICY.worth_another:
                 break
+        state = _leave_flat_bounds(problem, state, most_steps, tolerance)
     return Fit(
         problem.effects, problem.coordinates, state.theta, state.shot_parameters, state.spread, state.residual
     )
@@ -178,6 +179,26 @@ def fit_from(problem: Problem, model: Fit) -> Fit:
     """
     model_problem = problem.with_effects(model.effects)
     return fit(model_problem, model.theta, model.shot_parameters, spread=model.spread)
+
+
+def _leave_flat_bounds(problem: Problem, state: FitState, most_steps: int, tolerance: float) -> FitState:
+    """Begin again inside the range of coordinates that have come to a bound at which they have no slope.
+
+    mu_s/mu_k beside a compliant stiction is one: at 1 the prediction does not change with it to first order,
+    so that no step leaves it, however much better it would be further on.
+    """
+    lower, upper = problem.bounds()
+    at_bound = ((state.theta <= lower) | (state.theta >= upper)) & (lower < upper)
+    if not at_bound.any() or not state.cost < POLICY.hopeless_misfit * state.residual.size:
+        return state
+    change = np.linalg.norm(problem.shared_jacobian(state), axis=1) * (upper - lower)
+    flat = at_bound & (change < 1.0)
+    if not flat.any():
+        return state
+    initial = np.array([coordinate.initial for coordinate in problem.coordinates])
+    start = problem.evaluate(np.where(flat, initial, state.theta), state.shot_parameters, state.spread)
+    again = gauss_newton(problem, start, most_steps, tolerance) if start.cost < math.inf else start
+    return again if again.cost < state.cost else state
 
 
 def _centre_factors(problem: Problem, state: FitState) -> FitState:

@@ -43,6 +43,11 @@ class LinearisedFit:
     shot_information: Samples
     shot_gradient: Samples
 
+    @property
+    def mean_squared_residual(self) -> float:
+        """Of all samples, the shots' own numbers projected out; 1 where noise is all that is left."""
+        return float(np.mean(self.rows[self.own] ** 2))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scores:

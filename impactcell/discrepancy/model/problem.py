@@ -118,6 +118,14 @@ class Problem:
         shots = replace(self.shots, items=items)
         return Problem(shots, self.batches, self.effects, self.constraints)
 
+    def pinned(self, column: int, value: float) -> "Problem":
+        """Return the same model with one coordinate where it is put."""
+        other = self._like(self.effects, self.constraints)
+        coordinates = list(self.coordinates)
+        coordinates[column] = replace(coordinates[column], lower=value, upper=value)
+        other.coordinates = tuple(coordinates)
+        return other
+
     def _like(self, effects: tuple[str, ...], constraints: Constraints) -> "Problem":
         other = object.__new__(Problem)
         other._set(self.forward, effects, constraints)

@@ -150,10 +150,7 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
                 "at_bound": item.at_bound,
                 "unit": unit,
             }
-            for item in (
-                *(one for one in result.parameters if not one.effect),
-                *result.effect_parameters,
-            )
+            for item in result.stated_parameters
             for words, unit in [parameter_words(item.effect, item.parameter, language)]
         ],
         "proof": result.validation,

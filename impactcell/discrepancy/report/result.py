@@ -78,7 +78,7 @@ def result_document(result: DiscrepancyResult) -> dict[str, Any]:
         "simulation": _simulation(result.simulation),
         **_law(result),
         "next_experiment": experiments(result.experiments),
-        "nominal": _parameters([estimate for estimate in result.parameters if not estimate.effect]),
+        "nominal": _parameters([estimate for estimate in result.stated_parameters if not estimate.effect]),
         "noise_floor": {
             "noise_std": [round_digits(value) for value in result.floor.noise_std],
             "source": list(result.floor.source),
@@ -184,7 +184,7 @@ def _effect(result: DiscrepancyResult, effect: str) -> dict[str, Any]:
         "p_search": round_digits(result.selection.p_values.get(effect, 1.0)),
         "held_out": _change(change) | {"parts": [str(part) for part in change.parts]},
         "where": locate_effect(result, effect),
-        "parameters": _parameters([one for one in result.effect_parameters if one.effect == effect]),
+        "parameters": _parameters([one for one in result.stated_parameters if one.effect == effect]),
     }
 
 
