@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from impactcell.records import Samples
 
@@ -59,7 +60,14 @@ def noise_of(values: Samples) -> float:
 def pulse_sign(force: Samples) -> int:
     """Sign of the contact force: that of the larger excursion from the median."""
     middle = float(np.median(force))
-    return 1 if force.max() - middle >= middle - force.min() else -1
+    low, high = extremes(force)
+    return 1 if high - middle >= middle - low else -1
+
+
+def extremes(force: Samples) -> tuple[float, float]:
+    """Smallest and largest force that lasts for as many samples as a contact: a spike is neither."""
+    lasting = median_filter(force, 2 * CONFIRMING_SAMPLES - 1, mode="nearest")
+    return float(lasting.min()), float(lasting.max())
 
 
 def baseline_of(force: Samples, threshold_n: float | None = None) -> Baseline:
@@ -69,7 +77,7 @@ def baseline_of(force: Samples, threshold_n: float | None = None) -> Baseline:
     Andrews et al. 1972), and as far around as noise goes: a contact that takes half of the record and rises
     slowly is no noise.
     """
-    low, high = float(force.min()), float(force.max())
+    low, high = extremes(force)
     resting = np.sort(force[force <= 0.5 * (low + high)])
     count = len(resting) // RESTING_PART
     noise = noise_of(force)

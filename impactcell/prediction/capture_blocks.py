@@ -16,7 +16,7 @@ from impactcell.prediction.block_averaging import (
     average_blocks,
 )
 from impactcell.prediction.linearised_model import LATEST_ONSET, LinearisedModel, RecorderStd
-from impactcell.records import Capture, Samples
+from impactcell.records import AT_THE_HALT_S, Capture, Samples
 
 KINK_SPAN_S = 1.5e-4
 """How far to either side of an event of the start, s, blocks are short: the fit has its event there. With
@@ -28,9 +28,6 @@ times how well it is known when that is. A sample that the jump crosses is off b
 and its slope is that of a wall."""
 LEFT_OUT = 1e3
 """Factor of the standard deviation of blocks that are left out of a fit."""
-AT_THE_HALT_S = 1e-9
-"""A sample this near to the actuator's halt, s, is of before or after it by rounding alone: modules give
-times in whole ns."""
 
 
 def tap_input(capture: Capture) -> TapInput:
@@ -71,8 +68,8 @@ def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
     motion = simulate_tap(plant, tap)
     kinks = [*(event.time_s for event in motion.events), required(features.separation).value]
     spans = [(time - KINK_SPAN_S, time + KINK_SPAN_S) for time in kinks]
-    halt = tap.stroke_m / tap.velocity_m_s
-    edges = [halt] if math.isfinite(halt) else []
+    halt_s = features.capture.halt_s
+    edges = [halt_s] if math.isfinite(halt_s) else []
     pressed = _surely_touching(required(features.force).after_contact(), onset_std_s)
     force = average_blocks(pressed, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
     jumps = [event.time_s for event in motion.events if event.kind is TapEventKind.CONTACT]

@@ -6,6 +6,7 @@ from it; a `Snapshot` holds them together for one cycle and is what is published
 
 from impactcell.records.alarm import Alarm, Evidence, Shelving
 from impactcell.records.capture import (
+    AT_THE_HALT_S,
     FORCE_SCALE_STD,
     MASS_STD,
     VELOCITY_STD,
@@ -33,6 +34,7 @@ from impactcell.records.snapshot import PositioningState, Snapshot, TapPredictio
 from impactcell.records.units import MM_PER_MIN
 
 __all__ = [
+    "AT_THE_HALT_S",
     "FORCE_SCALE_STD",
     "MASS_STD",
     "MM_PER_MIN",

@@ -1,5 +1,6 @@
 """What a module measured in one cycle."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -10,6 +11,8 @@ Samples = NDArray[np.float64]
 
 FIRST_CONTACT_S = 1e-9
 """Time [s] up to which a sample is taken at first contact itself: modules give times in whole ns."""
+AT_THE_HALT_S = 1e-9
+"""A sample of the force this near to the actuator's halt [s] is of before or after it by rounding alone."""
 ONSET_STD = 0.5
 """Standard deviation of first contact about t = 0, in sampling steps, where a recorder sees it in samples: it
 may lie anywhere within one, and where a soft contact shows is off by as much again."""
@@ -118,6 +121,11 @@ class Capture:
     mass_std: float = 0.0
     velocity_std: float = 0.0
     force_scale_std: float = 0.0
+
+    @property
+    def halt_s(self) -> float:
+        """When the actuator halts after its stroke [s]; inf or nan where nothing says so."""
+        return self.stroke_m / self.velocity_m_s if self.velocity_m_s else math.inf
 
 
 @dataclass(frozen=True, slots=True)

@@ -246,3 +246,23 @@ def test_a_quarter_of_every_setting_is_held_out() -> None:
     spread = 4.0 * math.sqrt(share.mean() * (1.0 - share.mean()) / 400)
     for velocity in np.unique(velocities):
         assert share[velocities == velocity].mean() == pytest.approx(share.mean(), abs=spread)
+
+
+def test_a_sample_at_the_actuators_halt_says_nothing() -> None:
+    """The force jumps there: whether the sample is of before or after is a matter of rounding."""
+    job = Job("single", (), 3, shots=12)
+    made = campaign(job)
+    bent = []
+    for shot in made.shots:
+        assert shot.force is not None
+        at_halt = np.abs(shot.force.time_s - made.stroke_m / shot.velocity_m_s) < 1e-9
+        values = shot.force.values + np.where(at_halt, 20.0, 0.0)
+        bent.append(replace(shot, force=replace(shot.force, values=values)))
+    assert any(
+        not np.array_equal(one.force.values, other.force.values)
+        for one, other in zip(bent, made.shots, strict=True)
+    )
+    as_made, as_bent = prepare(made), prepare(replace(made, shots=tuple(bent)))
+    for one, other in zip(as_made.shots, as_bent.shots, strict=True):
+        for left, right in zip((*one.times, *one.values), (*other.times, *other.values), strict=True):
+            assert np.array_equal(left, right)

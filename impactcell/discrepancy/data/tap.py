@@ -19,7 +19,7 @@ from impactcell.discrepancy.data.prepared_shots import (
     ShotSet,
 )
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio
-from impactcell.records import MM_PER_MIN, Capture, Channel, since_contact
+from impactcell.records import AT_THE_HALT_S, MM_PER_MIN, Capture, Channel, since_contact
 
 SPEED_RATIO = PlausibleRatio(
     0.05, 20.0, "the part's speed over the actuator's velocity", "position_m, time_s or velocity_mm_per_min"
@@ -61,11 +61,13 @@ class Tap(ExcitationStrategy):
     floor_is_certain = True
 
     def predicted_channels(self, capture: Capture) -> tuple[Channel | None, Channel | None, Channel | None]:
-        """All of them; of the force what comes after first contact, where it jumps and has no one value."""
+        """All of them; of the force no sample at first contact and at the actuator's halt: it jumps there."""
         force = capture.force
         if force is not None:
             since = since_contact(force.time_s)
-            force = replace(force, time_s=force.time_s[since], values=force.values[since])
+            time_s, values = force.time_s[since], force.values[since]
+            beside_halt = ~(np.abs(time_s - capture.halt_s) < AT_THE_HALT_S)
+            force = replace(force, time_s=time_s[beside_halt], values=values[beside_halt])
         return force, capture.position, capture.actuator
 
     def missing_information(self, shots: Sequence[PreparedShot]) -> list[str]:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from impactcell.campaign.contacts import baseline_of, contact_onsets
+from impactcell.campaign.contacts import baseline_of, contact_onsets, pulse_sign
 
 STEP_S = 1e-4
 
@@ -40,3 +40,15 @@ def test_a_force_in_coarse_steps_rests_on_one_of_them() -> None:
     baseline = baseline_of(force)
     assert baseline.offset == 0.0
     assert baseline.noise_std == 0.0
+
+
+@pytest.mark.parametrize("spikes", [(250,), (250, 251), (30, 31, 250)])
+@pytest.mark.parametrize("height_n", [1e4, -1e4, 1e8])
+def test_a_spike_moves_no_onset(spikes: tuple[int, ...], height_n: float) -> None:
+    """A hundredth of the spike was the threshold: contact began up to 2 ms late."""
+    rng = np.random.default_rng(6)
+    time, force = STEP_S * np.arange(1000), rng.normal(0.0, 0.4, 1000)
+    force[200:500] += 15.0 + 140.0 * np.sin(np.pi * np.arange(300) / 300)
+    force[list(spikes)] = height_n
+    assert pulse_sign(force) == 1
+    assert contact_onsets(time, force, baseline_of(force)) == [200]
