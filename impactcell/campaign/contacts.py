@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import median_filter
 
+from impactcell.numerics.spikes import NORMAL_SCALE, noise_of
 from impactcell.records import Samples
 
 THRESHOLD_STD = 6.0
@@ -23,8 +24,6 @@ SYNCHRONOUS_SHARE = 0.5
 step it
 then begins cannot be told. Four onsets anywhere in the step are that close once in three times, eight once
 in 30."""
-NORMAL_SCALE = 1.4826
-"""Standard deviation over median absolute deviation of a normal distribution."""
 
 RESTING_PART, QUARTER_SCALE = 4, 3.14
 """Part of the samples that are looked for where they lie closest, a quarter, and the standard deviation of a
@@ -40,21 +39,6 @@ class Baseline:
     offset: float
     noise_std: float
     threshold: float
-
-
-def noise_of(values: Samples) -> float:
-    """Give the standard deviation of the white noise that a channel shows, from second differences; or 0.
-
-    The median of their magnitude is that of the noise where less than half of the samples lie on a kink; the
-    second difference of white noise has a variance of 6. It is 0 where most neighbours go on as before: of a
-    channel without noise, and of one whose raster hides it. `white_noise_std` of the features is what a fit
-    weighs by, and never below what a raster makes; here a threshold stands beside shares of the range and
-    steps of the raster, and that there is no noise decides by itself (an exact record rests on a plateau).
-    """
-    if len(values) < 5:
-        return 0.0
-    second = np.diff(values, 2)
-    return float(NORMAL_SCALE * np.median(np.abs(second)) / np.sqrt(6.0))
 
 
 def pulse_sign(force: Samples) -> int:

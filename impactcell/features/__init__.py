@@ -6,6 +6,7 @@ from impactcell.features.measured import MeasuredFeature
 from impactcell.features.noise import drive_noise_std, is_command, noise_std, white_noise_std
 from impactcell.features.segment import SlideSegment
 from impactcell.features.slide import SlideFeatures
+from impactcell.features.spikes import without_spikes
 
 __all__ = [
     "CheckedChannel",
@@ -21,4 +22,5 @@ __all__ = [
     "noise_std",
     "required",
     "white_noise_std",
+    "without_spikes",
 ]

@@ -17,6 +17,7 @@ from impactcell.features.measured import MeasuredFeature
 from impactcell.features.noise import noise_std
 from impactcell.features.segment import SlideSegment, extract_segment
 from impactcell.features.slide import SlideFeatures, extract_slide
+from impactcell.features.spikes import without_spikes
 from impactcell.records import Capture
 
 Fault = PredictionError | PhysicsError
@@ -33,7 +34,7 @@ class Features:
     Attributes
     ----------
     capture : Capture
-        From which they are.
+        From which they are, without its spikes.
     force : CheckedForce or Fault
     position : CheckedChannel or Fault
         Displacement from where the part lay, m, positive along +1. Both channels carry their noise.
@@ -46,6 +47,8 @@ class Features:
     segment : SlideSegment or Fault
         Block means of the position from separation, or from the start of a record without force, to just
         before rest.
+    left_out : tuple of str
+        What of the capture is in none of them.
     """
 
     capture: Capture
@@ -55,6 +58,7 @@ class Features:
     separation: MeasuredFeature | Fault
     slide: SlideFeatures | Fault
     segment: SlideSegment | Fault
+    left_out: tuple[str, ...] = ()
 
 
 def extract(capture: Capture) -> Features:
@@ -66,6 +70,7 @@ def extract(capture: Capture) -> Features:
     >>> features.slide
     CaptureError('no position was recorded')
     """
+    capture, left_out = without_spikes(capture)
     force = _attempt(check_force, capture.force)
     position = _attempt(displacement, capture)
     path = position if isinstance(position, Fault) else _attempt(path_along_tap, position, capture.direction)
@@ -79,7 +84,14 @@ def extract(capture: Capture) -> Features:
     else:
         slide = _attempt(extract_slide, path, separation)
     return Features(
-        capture, force, position, peak, separation, slide, _segment(capture, position, separation)
+        capture,
+        force,
+        position,
+        peak,
+        separation,
+        slide,
+        _segment(capture, position, separation),
+        left_out,
     )
 
 

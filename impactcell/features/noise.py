@@ -56,7 +56,7 @@ def white_noise_std(values: Samples) -> float:
     or a spike. On a coarse raster many are as large as their median, but for what decimals of a file are
     rounded, and that says little: then it is their root mean square without the largest, and no less than
     what rounding makes; nan for fewer than four values, which may not hold any that is not finite. So it is
-    above 0 for an exact record, too: `contacts.noise_of` tells whether a channel shows noise at all.
+    above 0 for an exact record, too: `noise_of` of the numerics tells whether a channel shows noise at all.
     """
     if len(values) < 4:
         return math.nan

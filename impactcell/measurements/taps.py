@@ -12,6 +12,7 @@ from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Given
 from impactcell.measurements.measured_records import Record
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
+from impactcell.numerics.spikes import noise_of
 from impactcell.records import Capture, Channel, Samples
 
 START_STD = 10.0
@@ -219,5 +220,5 @@ def _start(position: Channel) -> float:
     if len(before) < 3:
         before = position.values[:3]
     place = float(np.mean(before))
-    noise = contacts.noise_of(position.values)
+    noise = noise_of(position.values)
     return place if abs(place) > START_STD * noise / math.sqrt(len(before)) else 0.0

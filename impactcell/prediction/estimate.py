@@ -1,6 +1,7 @@
 """One capture in, one `FrictionEstimate` out: every predictor, and the one that is published."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from impactcell.errors import NotConvergedError, PredictionError
@@ -78,8 +79,8 @@ def estimate_from_features(features: Features, model: Model, misfit: float = 1.0
                 missed = f"the model misses these taps: residuals are {misfit:.3g} times the noise"
                 mu_s, mu_k = _with_warnings(mu_s, missed), _with_warnings(mu_k, missed)
     return FrictionEstimate(
-        mu_s=mu_s,
-        mu_k=mu_k,
+        mu_s=_with_notes(mu_s, features.left_out),
+        mu_k=_with_notes(mu_k, features.left_out),
         by_force=equations.force,
         by_distance=equations.distance,
         combined=equations.combined,
@@ -203,9 +204,14 @@ def _with_warnings(coefficient: Coefficient, *warnings: str) -> Coefficient:
     texts = [text for text in warnings if text]
     if not texts:
         return coefficient
-    reasons = dict.fromkeys([*filter(None, coefficient.reason.split("; ")), *"; ".join(texts).split("; ")])
     quality = max(coefficient.quality, Quality.UNCERTAIN)
-    return replace(coefficient, quality=quality, reason="; ".join(reasons))
+    return _with_notes(replace(coefficient, quality=quality), texts)
+
+
+def _with_notes(coefficient: Coefficient, notes: Sequence[str]) -> Coefficient:
+    """Add what is to be said of a coefficient and makes it no worse."""
+    said = filter(None, (*coefficient.reason.split("; "), *"; ".join(notes).split("; ")))
+    return replace(coefficient, reason="; ".join(dict.fromkeys(said))) if notes else coefficient
 
 
 def _select_published(capture: Capture, equations: _Equations) -> tuple[Coefficient, Estimator]:

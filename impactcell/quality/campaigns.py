@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
-from impactcell.campaign.contacts import noise_of
 from impactcell.campaign.contents import CHANNELS
 from impactcell.errors import CampaignError
+from impactcell.numerics.spikes import noise_of
 from impactcell.quality.channel_faults import channel_faults
 from impactcell.quality.data_fault import DataFault, Fault
 from impactcell.quality.motion_faults import LATE_STEPS, lateness_s, slides

@@ -2,26 +2,14 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
-from impactcell.campaign.contacts import noise_of
 from impactcell.features import white_noise_std
 from impactcell.features.clipping import is_cut_off
 from impactcell.numerics.raster import raster_of
+from impactcell.numerics.spikes import noise_of, spike_samples
 from impactcell.quality.data_fault import DataFault, Fault
 from impactcell.records import Channel, Samples
 
-SPIKE_STD = 12.0
-"""Distance of a spike from the median of five samples, in standard deviations of the noise: white noise
-gets there
-once in 1e30 samples."""
-SPIKE_SHARE = 2e-3
-"""The same as a share of the range: where there is no noise, a kink is that far from the median of its
-neighbours."""
-RASTER_STEPS = 3.0
-"""The same in steps of a coarse raster, over which noise jumps by one or two."""
-MAX_SPIKE_SAMPLES = 2
-"""Samples in a row that are a spike; more is a motion, or a median of five would not see them."""
 MIN_PLATEAU = 5
 """Equal samples in a row that noise does not make."""
 PLATEAU_FACTOR = 3.0
@@ -51,22 +39,15 @@ def channel_faults(name: str, channel: Channel, shot: int) -> list[DataFault]:
 
 def _spikes(name: str, channel: Channel, shot: int) -> list[DataFault]:
     values = channel.values
-    away = np.abs(values - median_filter(values, 5, mode="nearest"))
-    steps = np.abs(np.diff(values))
-    raster = float(steps[steps > 0.0].min())
-    far = away > max(SPIKE_STD * noise_of(values), SPIKE_SHARE * float(np.ptp(values)), RASTER_STEPS * raster)
-    # An edge of the signal stays where it is under a median; what comes and goes within two samples does not.
-    starts, lengths = _runs(far)
-    isolated = starts[lengths <= MAX_SPIKE_SAMPLES]
-    isolated = isolated[(isolated > 1) & (isolated < len(values) - 3)]
-    if not isolated.size:
+    spikes = spike_samples(values)
+    if not spikes.size:
         return []
+    isolated = spikes[np.concatenate([[True], np.diff(spikes) > 1])]
     first = int(isolated[0])
     told = (
         f"{isolated.size} outliers in the {name}, the first at {channel.time_s[first]:.6g} s "
         f"({values[first]:.4g} amid "
-        f"{float(np.median(values[max(first - 2, 0) : first + 3])):.4g}): check cable and shielding, or "
-        f"leave them out"
+        f"{float(np.median(values[max(first - 2, 0) : first + 3])):.4g}): check cable and shielding"
     )
     return [DataFault(Fault.OUTLIERS, name, told, shot)]
 

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from impactcell.campaign.contacts import baseline_of, noise_of
+from impactcell.campaign.contacts import baseline_of
+from impactcell.numerics.spikes import noise_of
 from impactcell.quality.data_fault import DataFault, Fault
 from impactcell.records import Capture, Channel, Samples
 

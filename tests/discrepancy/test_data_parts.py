@@ -17,7 +17,7 @@ from impactcell.discrepancy.data.noise_floor import sensor_noise
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio, check_units
 from impactcell.errors import CampaignError
 from impactcell.records import Capture
-from tests.discrepancy.study import Job, campaign, name_effects
+from tests.discrepancy.study import Job, campaign, name_effects, quick_campaign
 
 
 def test_a_part_that_turns_round_goes_on_by_the_ratio_of_its_accelerations() -> None:
@@ -266,3 +266,22 @@ def test_a_sample_at_the_actuators_halt_says_nothing() -> None:
     for one, other in zip(as_made.shots, as_bent.shots, strict=True):
         for left, right in zip((*one.times, *one.values), (*other.times, *other.values), strict=True):
             assert np.array_equal(left, right)
+
+
+@pytest.mark.parametrize(("channel", "height"), [("force", 1e3), ("position", 1e-3), ("actuator", 1e-4)])
+def test_lone_outliers_are_no_missing_effect(channel: str, height: float) -> None:
+    """Three of them among 24 shots were 40 noise floors that no known effect explains."""
+    made = quick_campaign(Job("single", (), 3, shots=24))
+    shots = list(made.shots)
+    for place, sample in ((2, 20), (11, 60), (17, 100)):
+        recorded = getattr(shots[place], channel)
+        values = recorded.values.copy()
+        values[sample] += height
+        shots[place] = replace(shots[place], **{channel: replace(recorded, values=values)})
+    prepared = prepare(replace(made, shots=tuple(shots)))
+    assert "Outliers of 3 shots are left out of the fits." in prepared.notes
+    sizes = [shot.size for shot in prepare(made).shots]
+    assert sum(sizes) - sum(shot.size for shot in prepared.shots) == 3
+    number = ("force", "position", "actuator").index(channel)
+    largest = [np.abs(shot.values[number]).max() for shot in prepared.shots]
+    assert largest == pytest.approx([np.abs(shot.values[number]).max() for shot in prepare(made).shots])

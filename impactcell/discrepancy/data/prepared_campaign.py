@@ -25,7 +25,7 @@ from impactcell.discrepancy.data.prepared_shots import (
 from impactcell.discrepancy.data.tap import Tap
 from impactcell.discrepancy.data.unit_checks import check_units
 from impactcell.errors import CampaignError
-from impactcell.features import noise_std
+from impactcell.features import noise_std, without_spikes
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Channel, Samples, sampling_step_s
 
@@ -89,6 +89,7 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     data_faults = inspect_campaign(campaign)
     refuse_unusable(campaign, data_faults)
     notes = [*pretrigger, *notes_of(data_faults)]
+    campaign = _without_spikes(campaign, notes)
     captures = strategy.cut(campaign, notes)
     if len(captures) < MIN_SHOTS:
         message = (
@@ -124,6 +125,17 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         noise_at_rest(whole, campaign),
         tuple(notes),
     )
+
+
+def _without_spikes(campaign: Campaign, notes: list[str]) -> Campaign:
+    """Leave lone outliers out, but of a drive: a force that acts has no sample missing."""
+    if campaign.excitation is Excitation.DRIVEN:
+        return campaign
+    cleaned = [without_spikes(shot)[0] for shot in campaign.shots]
+    changed = sum(after is not before for before, after in zip(campaign.shots, cleaned, strict=True))
+    if changed:
+        notes.append(f"Outliers of {changed} shots are left out of the fits.")
+    return replace(campaign, shots=tuple(cleaned))
 
 
 def check_campaign_units(campaign: Campaign) -> None:

@@ -32,7 +32,7 @@ DATA_FAULTS: Final[Patterns] = (
      lambda m: f"{phrase(m[1])} steht konstant auf {m[2]}: nicht angeschlossen, oder die falsche Spalte"),
     (r"(\d+) outliers in the (\w+), the first at (\S+) s \((\S+) amid (\S+)\): .*",
      lambda m: f"Ausreißer ({phrase(m[2])}): {m[1]}, der erste bei {m[3]} s ({m[4]} inmitten von {m[5]}): "
-     "Kabel und Schirmung prüfen, oder sie weglassen"),
+     "Kabel und Schirmung prüfen"),
     (r"the (\w+) stands at its (\w+) end, (\S+), for (\d+) samples from (\S+) s \((\d+) in all\): .*",
      lambda m: f"{phrase(m[1])} steht {m[4]} Messwerte lang am {ENDS[m[2]]} Ende, {m[3]}, ab {m[5]} s "
      f"({m[6]} insgesamt): abgeschnitten; einen weiteren Messbereich wählen"),
@@ -115,6 +115,7 @@ NOTES: Final[Patterns] = (
      r"Stoß \1 hat eine Lücke in der Zeit; was darin geschah, ist verloren."),
     (r"Samples before contact \(pretrigger\) of (\d+) shots are left out of the fits\.",
      r"Messwerte vor dem Kontakt (Stöße: \1) werden nicht angepasst."),
+    (r"Outliers of (\d+) shots are left out of the fits\.", r"Ausreißer werden nicht angepasst (Stöße: \1)."),
     (r"(\d+) of (\d+) samples stood far from their neighbours and were replaced\.",
      r"\1 von \2 Messwerten lagen weit von ihren Nachbarn und wurden ersetzt."),
     (r"The force is held from one update to the next in (\d+) of (\d+) records: .*",

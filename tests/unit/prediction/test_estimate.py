@@ -241,3 +241,28 @@ def test_no_damage_to_a_capture_raises(which: str, kind: str, seed: int) -> None
     damaged = replace(channel, values=values, time_s=times)
     capture = replace(GOOD, force=damaged) if which == "force" else replace(GOOD, position=damaged)
     consistent(estimate(capture, MODEL))
+
+
+@pytest.mark.parametrize(("which", "height"), [("force", 1e3), ("force", -50.0), ("position", 1e-3)])
+@pytest.mark.parametrize("place", [60, 90, 150])
+def test_a_lone_outlier_is_left_out_and_said(which: str, height: float, place: int) -> None:
+    """It made the tap unlike the model: mu_s came from the equations, or not at all."""
+    channel = force(GOOD) if which == "force" else position(GOOD)
+    values = channel.values.copy()
+    values[place] += height
+    spoilt = replace(GOOD, **{which: replace(channel, values=values)})
+    found, clean = estimate(spoilt, MODEL), estimate(GOOD, MODEL)
+    consistent(found)
+    assert found.estimator is Estimator.WAVEFORM
+    assert found.mu_s.quality is Quality.GOOD
+    assert found.mu_s.reason == f"1 outlier of the {which} left out"
+    assert found.mu_s.value == pytest.approx(clean.mu_s.value, abs=0.2 * clean.mu_s.std)
+    assert found.mu_k.value == pytest.approx(clean.mu_k.value, abs=0.5 * clean.mu_k.std)
+    assert clean.mu_s.reason == ""
+
+
+def test_many_outliers_are_no_accident() -> None:
+    values = force(GOOD).values.copy()
+    values[10:180:10] += 50.0
+    found = estimate(replace(GOOD, force=replace(force(GOOD), values=values)), MODEL)
+    assert found.mu_s.quality is not Quality.GOOD

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from impactcell.campaign import Campaign, Excitation
-from impactcell.campaign.contacts import noise_of
 from impactcell.errors import CampaignError
 from impactcell.features import white_noise_std
+from impactcell.numerics.spikes import noise_of
 from impactcell.quality import Fault, inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Channel
 from tests.taps import Tap
