@@ -1,18 +1,46 @@
 """The past of a cell in as many columns as a chart has, at a cost that does not grow with the journal."""
 
 import contextlib
+import math
 import sqlite3
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
 from typing import Any, Final
 
+from impactcell.alarms.rules import batch_shift
 from impactcell.errors import JournalError
 from impactcell.journal.checksums import CheckedTables
 from impactcell.journal.database import errors, open_database
+from impactcell.journal.stored_forms import load_alarms
 
 CYCLES_PER_COLUMN: Final = 60
 """Cycles that are read and checked in one column; of more, the first so many stand for all."""
+SHIFTS: Final = 200
+"""Transitions of the alarm of a batch shift that are looked at, the newest: more marks than a chart shows."""
+LOOKED_BACK: Final = 5000
+"""Cycles before the alarm among which the first after the change is looked for: it is seldom far."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """A change of the material that the tracker found.
+
+    Attributes
+    ----------
+    time_ns : int
+        Of the first cycle after it; of the alarm, where the journal does not have that cycle any more.
+    cycle : int
+        That cycle.
+    size, size_std : float
+        By how much friction is higher since.
+    """
+
+    time_ns: int
+    cycle: int
+    size: float
+    size_std: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +80,14 @@ _CYCLES: Final = "SELECT * FROM cycles WHERE time_ns >= ? AND time_ns < ? ORDER 
 _LAST: Final = (
     "SELECT * FROM cycles WHERE time_ns >= ? AND time_ns < ? ORDER BY time_ns DESC, seq DESC LIMIT 1"
 )
+_SHIFTS: Final = (
+    "SELECT * FROM alarms WHERE time_ns >= ? AND time_ns < ? AND instr(record, ?) "
+    "ORDER BY time_ns DESC, id DESC LIMIT ?"
+)
+_CYCLE_BEFORE: Final = (
+    "SELECT time_ns FROM (SELECT cycle, time_ns FROM cycles WHERE time_ns <= ? "
+    "ORDER BY time_ns DESC, seq DESC LIMIT ?) WHERE cycle = ? LIMIT 1"
+)
 
 
 def trend(
@@ -72,10 +108,7 @@ def trend(
     JournalError
         The journal cannot be read.
     """
-    if not path.is_file():
-        raise JournalError(f"{path}: there is no such journal")
-    with errors(path), contextlib.closing(open_database(path, None, read_only=True)) as database:
-        reader = _Reader(database, path)
+    with _reading(path) as reader:
         first_ns = reader.first_ns(start_ns)
         if first_ns is None:
             return ()
@@ -83,6 +116,28 @@ def trend(
         while width_ns > 1 and (width_ns // 2) * columns >= end_ns - first_ns:
             width_ns //= 2
         return _columns(reader, range(first_ns - first_ns % width_ns, end_ns, width_ns), end_ns, finished)
+
+
+def shifts(path: Path, start_ns: int, end_ns: int) -> tuple[Shift, ...]:
+    """Read the changes of the material that were found from `start_ns` on, before `end_ns`, in their order.
+
+    They are those of the alarm, whatever became of it since; a batch that was named is in the columns.
+
+    Raises
+    ------
+    JournalError
+        The journal cannot be read.
+    """
+    with _reading(path) as reader:
+        return reader.shifts(start_ns, end_ns)
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator["_Reader"]:
+    if not path.is_file():
+        raise JournalError(f"{path}: there is no such journal")
+    with errors(path), contextlib.closing(open_database(path, None, read_only=True)) as database:
+        yield _Reader(database, path)
 
 
 def _columns(
@@ -134,6 +189,27 @@ class _Reader:
             max(gap, default=None),
             None if batch_id is None else str(batch_id),
         )
+
+    def shifts(self, start_ns: int, end_ns: int) -> tuple[Shift, ...]:
+        """Read the changes that the alarm of a batch shift told, each once."""
+        named = f'"{batch_shift.NAME}"'
+        rows = self._database.execute(_SHIFTS, (start_ns, end_ns, named, SHIFTS)).fetchall()
+        at = self._tables.columns["alarms"].index("record")
+        records = [str(row[at]) for row in rows if self._tables.is_whole("alarms", row)]
+        found: dict[tuple[int, int], Shift] = {}
+        for alarm in load_alarms(records):
+            evidence = alarm.evidence
+            key = alarm.activation, evidence.change_cycle
+            if alarm.name != batch_shift.NAME or not math.isfinite(evidence.size) or key in found:
+                continue
+            told_ns = alarm.activation or alarm.time_ns  # what is done to it later has a later time
+            before = self._database.execute(
+                _CYCLE_BEFORE, (told_ns, LOOKED_BACK, evidence.change_cycle)
+            ).fetchone()
+            time_ns = told_ns if before is None else int(before[0])
+            if time_ns >= start_ns:
+                found[key] = Shift(time_ns, evidence.change_cycle, evidence.size, evidence.size_std)
+        return tuple(sorted(found.values(), key=lambda shift: shift.time_ns))
 
     def _whole(self, query: str, *arguments: int) -> list[tuple[Any, ...]]:
         rows = self._database.execute(query, arguments).fetchall()

@@ -10,7 +10,7 @@ from starlette.responses import JSONResponse, RedirectResponse, Response
 from starlette.types import ASGIApp
 
 from impactcell.errors import JournalError
-from impactcell.journal.trend import TrendColumn
+from impactcell.journal.trend import Shift, TrendColumn
 from impactcell.scada import RefusedError
 from impactcell.web.cell_view import number
 from impactcell.web.event_stream import MAX_VIEWERS, EventStream
@@ -80,10 +80,10 @@ async def trend(context: PageContext, request: Request, _: BrowserSession) -> Re
     if facts.journal is None:
         return Response(status_code=204)
     try:
-        columns = await context.past.trend(facts.journal, span)
+        columns, shifts = await context.past.trend(facts.journal, span)
     except JournalError:
         return JSONResponse({"error": "the journal cannot be read now"}, 503)
-    return JSONResponse(_trend_content(columns))
+    return JSONResponse(_trend_content(columns, shifts))
 
 
 def _cell(context: PageContext, request: Request) -> CellFacts:
@@ -93,8 +93,8 @@ def _cell(context: PageContext, request: Request) -> CellFacts:
     return facts
 
 
-def _trend_content(columns: tuple[TrendColumn, ...]) -> dict[str, Any]:
-    """Give the series of a trend, and where a batch begins."""
+def _trend_content(columns: tuple[TrendColumn, ...], shifts: tuple[Shift, ...]) -> dict[str, Any]:
+    """Give the series of a trend, where a batch begins, and where the material is found to have changed."""
 
     def series(values: list[float | None]) -> list[float | None]:
         return [None if value is None else number(value) for value in values]
@@ -112,6 +112,15 @@ def _trend_content(columns: tuple[TrendColumn, ...]) -> dict[str, Any]:
         "level_std": series([column.level_std for column in columns]),
         "gap": series([column.gap for column in columns]),
         "batches": batches,
+        "shifts": [
+            {
+                "time_ms": shift.time_ns // 1_000_000,
+                "cycle": shift.cycle,
+                "size": number(shift.size),
+                "size_std": number(shift.size_std),
+            }
+            for shift in shifts
+        ],
     }
 
 

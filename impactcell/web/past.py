@@ -13,10 +13,12 @@ from typing import Final, TypeVar
 
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.store import Journal
-from impactcell.journal.trend import Finished, TrendColumn, trend
+from impactcell.journal.trend import Finished, Shift, TrendColumn, shifts, trend
 from impactcell.records import Alarm
 
 T = TypeVar("T")
+Trend = tuple[tuple[TrendColumn, ...], tuple[Shift, ...]]
+"""Columns of a chart, and the changes of the material in their time."""
 
 SPANS_S: Final = {"hour": 3600.0, "shift": 8 * 3600.0, "month": 30 * 86_400.0}
 """Spans of a trend, seconds."""
@@ -31,14 +33,14 @@ class Past:
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="page-past")
-        self._trends: dict[tuple[Path, str], tuple[float, tuple[TrendColumn, ...]]] = {}
+        self._trends: dict[tuple[Path, str], tuple[float, Trend]] = {}
         self._finished: dict[tuple[Path, str], Finished] = {}
 
     async def run(self, work: Callable[[], T]) -> T:
         """Do some work in the thread of the past, one thing after the other."""
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
-    async def trend(self, journal: Path, span: str) -> tuple[TrendColumn, ...]:
+    async def trend(self, journal: Path, span: str) -> Trend:
         """Read the trend over the last hour, shift or month.
 
         Raises
@@ -58,13 +60,15 @@ class Past:
         """
         return await self.run(lambda: _alarms(journal, limit))
 
-    def _trend(self, path: Path, span: str) -> tuple[TrendColumn, ...]:
-        read_s, columns = self._trends.get((path, span), (-1e9, ()))
+    def _trend(self, path: Path, span: str) -> Trend:
+        read_s, read = self._trends.get((path, span), (-1e9, ((), ())))
         if time.monotonic() - read_s > FRESH_S[span]:
             end_ns, finished = time.time_ns(), self._finished.setdefault((path, span), {})
-            columns = trend(path, end_ns - int(SPANS_S[span] * 1e9), end_ns, COLUMNS, finished)
-            self._trends[path, span] = time.monotonic(), columns
-        return columns
+            start_ns = end_ns - int(SPANS_S[span] * 1e9)
+            columns = trend(path, start_ns, end_ns, COLUMNS, finished)
+            read = columns, shifts(path, start_ns, end_ns)
+            self._trends[path, span] = time.monotonic(), read
+        return read
 
 
 def _alarms(path: Path, limit: int) -> tuple[Alarm, ...]:

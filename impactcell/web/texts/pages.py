@@ -83,8 +83,8 @@ PAGE_TEXTS: Texts = {
     "position": ("Position", "Position"),
     "trend": ("Trend", "Verlauf"),
     "trend_help": (
-        "Band: µs of the cycles; line: level, as of the first batch; dashed: wear limit; marks: batches.",
-        "Band: µs der Zyklen; Linie: Niveau, wie in der ersten Charge; gestrichelt: Grenze; Marken: Chargen.",
+        "Band: µs of the cycles; line: level, as of the first batch; marks: batches; ▲ ▼: changes found.",
+        "Band: µs; Linie: Niveau, wie in der ersten Charge; Marken: Chargen; ▲ ▼: gefundene Chargenwechsel.",
     ),
     "span": ("Span", "Zeitraum"),
     "span_hour": ("Hour", "Stunde"),

@@ -12,7 +12,7 @@ import pytest
 
 from impactcell.journal.store import Journal
 from impactcell.journal.trend import CYCLES_PER_COLUMN, Finished, trend
-from impactcell.records import Alarm
+from impactcell.records import Alarm, Evidence
 from impactcell.scada import Role
 from impactcell.web.alarm_export import HEADER, to_csv, to_xlsx
 from impactcell.web.alarm_pages import SHOWN_HISTORY
@@ -110,6 +110,39 @@ async def test_the_trend_of_a_cell(tmp_path: Path) -> None:
     assert None not in hour["mu_s_low"]
     assert shift["time_ms"] == sorted(shift["time_ms"])
     assert [batch for _, batch in shift["batches"]] == ["A", "B"]
+
+
+def shifted(cycle: int, time_ns: int, size: float) -> Alarm:
+    evidence = Evidence(statistic=9.0, threshold=5.0, change_cycle=cycle, size=size, size_std=0.002)
+    return Alarm("BatchShift", active=True, time_ns=time_ns, activation=time_ns, evidence=evidence)
+
+
+async def test_a_change_that_was_found_has_its_mark_where_it_began(tmp_path: Path) -> None:
+    now = time.time_ns()
+    times = [now - (100 - i) * SECOND for i in range(80)]
+    store(tmp_path / "j.sqlite", times, {1: "A"})
+    first, second = shifted(21, times[24], 0.03), shifted(51, times[52], -0.01)
+    beyond = shifted(4_000, times[70], 0.02)
+    told = (
+        Alarm("BatchShift", suppressed=True, time_ns=times[10]),
+        first,
+        replace(first, acknowledged=True, time_ns=times[30]),
+        replace(first, active=False, time_ns=times[40]),
+        second,
+        replace(shifted(31, times[60], 0.1), name="ModelGap"),
+        beyond,
+    )
+    with Journal(tmp_path / "j.sqlite", CELL) as journal:
+        journal.record(b"", told)
+    async with make_page(tmp_path, tmp_path / "j.sqlite").logged_in(Role.OBSERVER) as client:
+        trend = (await client.get(f"/cells/{CELL}/trend?span=hour")).json()
+    assert [batch for _, batch in trend["batches"]] == ["A"]
+    began = (times[20], times[50], times[70])  # the last is told, and not there
+    assert trend["shifts"] == [
+        {"time_ms": began[0] // 10**6, "cycle": 21, "size": 0.03, "size_std": 0.002},
+        {"time_ms": began[1] // 10**6, "cycle": 51, "size": -0.01, "size_std": 0.002},
+        {"time_ms": began[2] // 10**6, "cycle": 4000, "size": 0.02, "size_std": 0.002},
+    ]
 
 
 async def test_a_journal_that_cannot_be_read_is_said(tmp_path: Path) -> None:
