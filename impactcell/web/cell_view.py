@@ -260,6 +260,7 @@ def _beside_values(snapshot: Snapshot) -> dict[str, Any]:
         "time_ms": snapshot.time_ns // 1_000_000,
         "mass": number(snapshot.mass_kg),
         "estimator": snapshot.friction.estimator.value,
+        "model": {language: Messages(language).model(snapshot.model_name) for language in LANGUAGES},
         "reasons": {
             "en": {name: english_reason(text) for name, text in reasons.items()},
             "de": {name: german_reason(text) for name, text in reasons.items()},

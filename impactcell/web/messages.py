@@ -17,6 +17,7 @@ from impactcell.german.findings import (
 from impactcell.german.link_faults import german_link_fault
 from impactcell.german.parameters import parameter_words
 from impactcell.physics.effect_names import as_title, in_words
+from impactcell.physics.effects import LIBRARY
 from impactcell.records import Alarm
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.texts import CATALOGUE, LANGUAGES
@@ -27,6 +28,8 @@ from impactcell.web.texts.reasons import english_reason, german_reason
 
 LEAST_WHOLE = 9.95
 """From here on two significant digits are a whole number."""
+ADDED = " + "
+"""Between the name of a model and the effects that were added to it."""
 LARGE = 1e9
 """From here on a number is written with an exponent, in any unit."""
 
@@ -121,6 +124,15 @@ class Messages:
         """Name an effect."""
         return german_effect(identifier) if self.language == "de" else in_words(identifier)
 
+    def model(self, name: str) -> str:
+        """Name a model: what has been added to it in words.
+
+        >>> Messages("de").model("prototype + viscous_friction")
+        'prototype + Viskose Reibung'
+        """
+        base, *added = name.split(ADDED)
+        return ADDED.join([base, *(self.effect(part) if part in LIBRARY else part for part in added)])
+
     def parameter(self, effect: str, name: str) -> tuple[str, str]:
         """Give words and unit of an effect's parameter."""
         return parameter_words(effect, name, self.language)
@@ -152,7 +164,7 @@ class Messages:
 
     def fault(self, fault: str) -> tuple[str, str]:
         """Say why files cannot be read or a model is refused, after the language in which it is said."""
-        refusal = model_fault(fault, self.language)
+        refusal = model_fault(fault, self.language, self.model)
         return page_fault(fault, self.language) if refusal is None else (self.language, refusal)
 
     def step(self, name: str) -> str:

@@ -65,6 +65,12 @@ def test_a_value_has_the_digits_of_what_stands_behind_it(
     assert f"{told.beside_std(value, std)} ± {told.told_std(std)}" == said
 
 
+def test_a_model_is_called_by_its_effects_in_words(browser: Browser) -> None:
+    load(browser, "de")
+    content = card(Model__Name="rail + viscous_friction") | {"model": {"de": "rail + Viskose Reibung"}}
+    assert browser.run(SHOW, "Model/Name", "", content) == "rail + Viskose Reibung"
+
+
 def test_cycles_that_are_left_are_whole_ones_and_the_same_everywhere(browser: Browser) -> None:
     load(browser, "en")
     content = card(

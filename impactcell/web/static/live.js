@@ -40,6 +40,7 @@ export function showValues(root, card) {
     const std = card.values[`${path}StdDev`] ?? null;
     let text = "–";
     if (typeof value === "boolean") text = value ? texts.yes : texts.no;
+    else if (path === "Model/Name") text = card.model[language] || "–";
     else if (typeof value === "string") text = value || "–";
     else if (std !== null && Number.isFinite(value)) text = [beside(std, value), toldStd(std), unit].filter(Boolean).join(" ");
     else if (form === "band") text = Number.isFinite(value) ? toldStd(value) : "–";

@@ -1,6 +1,7 @@
 """Why a model is not put into service, as the page says it: what `impactcell model accept` refuses."""
 
 import re
+from collections.abc import Callable
 from typing import Final
 
 REFUSED: Final = re.compile(
@@ -21,8 +22,8 @@ TEXTS: Final = {
 LEAVES: Final = re.compile(r"leaves (?P<gap>\S+) times the sensors' noise")
 
 
-def model_fault(fault: str, language: str) -> str | None:
-    """Say why a model was refused; None for what is no such refusal.
+def model_fault(fault: str, language: str, named: Callable[[str], str] = str) -> str | None:
+    """Say why a model was refused, which is called as `named` says; None for what is no such refusal.
 
     >>> model_fault("p: the file is missing", "de") is None
     True
@@ -31,6 +32,7 @@ def model_fault(fault: str, language: str) -> str | None:
     if match is None:
         return None
     said = match.groupdict()
+    said["model"] = named(said["model"])
     if language == "de":
         said |= {"after": _german(said["after"], " es"), "before": _german(said["before"], "")}
     return TEXTS[language].format_map(said)

@@ -8,8 +8,8 @@ from impactcell.cli.own_taps import OwnTaps
 from impactcell.web.messages import Messages
 
 
-def refusal(own: OwnTaps) -> str:
-    return f"press-1: model oil is not put into service (--anyway would): {own.sentence}"
+def refusal(own: OwnTaps, model: str = "oil") -> str:
+    return f"press-1: model {model} is not put into service (--anyway would): {own.sentence}"
 
 
 def test_both_figures_and_the_way_out_are_said_in_either_language() -> None:
@@ -28,6 +28,11 @@ def test_both_figures_and_the_way_out_are_said_in_either_language() -> None:
         "of the last 30 it leaves 7.12 times the sensors' noise, 2 estimates are usable; the model in"
         in english
     )
+
+
+def test_the_model_is_called_by_its_effects_in_words() -> None:
+    told = refusal(OwnTaps(30, 1.0, 7.123, 30, 2), "prototype + surface_tilt")
+    assert "Modell prototype + Neigung des Tisches wird nicht" in Messages("de").fault(told)[1]
 
 
 @pytest.mark.parametrize(

@@ -102,6 +102,18 @@ def test_a_card_has_both_languages() -> None:
     assert reasons["en"].keys() == reasons["de"].keys()
 
 
+def test_a_card_names_the_model_in_both_languages() -> None:
+    snapshot = make_snapshot(make_capture(3))
+    view = CellView("press-1")
+    view.take(CellNews("press-1", replace(snapshot, model_name="prototype + viscous_friction + own")))
+    card = json.loads(view.encode("card"))
+    assert card["values"]["Model/Name"] == "prototype + viscous_friction + own"
+    assert card["model"] == {
+        "en": "prototype + viscous friction + own",
+        "de": "prototype + Viskose Reibung + own",
+    }
+
+
 def test_what_import_notes_of_taps_is_said_in_german(tmp_path: Path) -> None:
     """Made by import itself, so that a note that is put otherwise is missed here."""
     rng = np.random.default_rng(2)

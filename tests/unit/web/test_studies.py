@@ -23,7 +23,7 @@ from impactcell.web.studies import campaign_archive, pages, queue, upload
 from impactcell.web.studies.campaign_archive import unpack_campaign
 from impactcell.web.studies.pages import REPORT_POLICY
 from impactcell.web.studies.queue import MAX_WAITING
-from impactcell.web.studies.study import Stage, Study, StudyStore
+from impactcell.web.studies.study import Acceptance, Stage, Study, StudyStore
 from impactcell.web.studies.upload import safe_name
 from tests.patience import PATIENCE_S
 from tests.unit.web.page import CELL, Page, Verbs, csrf_of, make_page
@@ -525,12 +525,16 @@ async def test_parameters_are_said_in_words_with_their_unit(page: Page) -> None:
     async with page.logged_in(Role.OBSERVER) as client:
         study = page.studies.store.begin("rail", "otto", CELL)
         study.stage, study.result = Stage.DONE, RESULT | {"effects": [found, own]}
-        study.changes = CHANGES | {"changes": changes}
+        study.changes = CHANGES | {"changes": changes, "after": "rail + stribeck_friction + own_effect"}
+        study.acceptances = [Acceptance("accept", "eva", 1, "rail + stribeck_friction")]
         shown = {code: (await client.get(f"/studies/{study.id}?lang={code}")).text for code in ("en", "de")}
     assert "</b> · Stribeck velocity 0.04 m/s · friction increase 0.03" in shown["en"]
     assert "</b> · Stribeck-Geschwindigkeit 0,04 m/s · Zunahme der Reibung 0,03" in shown["de"]
     assert "Own effect</b> · strength n per m 60" in shown["en"]
     names = re.findall(r'<tr><td data-label="[^"]*">(.*?)</td>', shown["de"])
+    assert "old → <b>rail + Stribeck friction + own_effect</b>" in shown["en"]
+    assert "old → <b>rail + Stribeck-Reibung + own_effect</b>" in shown["de"]
+    assert "rail + Stribeck-Reibung, eva" in shown["de"]
     assert names == ["µs", "Steifigkeit [N/m]", "Viskose Reibung: viskoser Koeffizient [N s/m]"]
 
 
