@@ -30,10 +30,12 @@ KINDS: Final = frozenset(
 """Ends of the names of what can be read."""
 MAX_NAME: Final = 80
 """Longest name, in characters."""
+MAX_STEM_BYTES: Final = 200
+"""Longest name without its kind, in UTF-8: a disk takes 255 with all that is written behind it."""
 
 
 def safe_name(name: str) -> str:
-    """Give a name under which a file can lie on any disk and be shown anywhere.
+    """Give a name under which a file can lie on any disk and be shown anywhere; letters stay as they are.
 
     Raises
     ------
@@ -43,16 +45,16 @@ def safe_name(name: str) -> str:
     >>> safe_name("../../etc/<script>alert(1)</script>.CSV")
     'script_.csv'
     >>> safe_name("Versuch 3 (März).csv")
-    'Versuch_3_Marz_.csv'
+    'Versuch_3_März_.csv'
     """
     last = re.split(r"[/\\]", name)[-1]
-    plain = unicodedata.normalize("NFKD", last).encode("ascii", "ignore").decode()
-    stem, dot, kind = plain.rpartition(".")
+    # Composed: macOS sends a letter and its dots apart, and the dots alone are no letter.
+    stem, dot, kind = unicodedata.normalize("NFKC", last).rpartition(".")
     suffix = f".{kind.lower()}"
     if not dot or suffix not in KINDS:
         raise RequestRefusedError(415, "error_kind")
-    stem = re.sub(r"[^A-Za-z0-9-]+", "_", stem).lstrip("_-") or "data"
-    return stem[: MAX_NAME - len(suffix)] + suffix
+    stem = re.sub(r"[^\w-]+", "_", stem).lstrip("_-")[: MAX_NAME - len(suffix)]
+    return (stem.encode()[:MAX_STEM_BYTES].decode(errors="ignore") or "data") + suffix
 
 
 async def receive(request: Request, target: Path, already_bytes: int) -> int:
