@@ -7,9 +7,13 @@ from typing import Any
 import pytest
 
 import impactcell.web
+from impactcell.alarms.rule import CycleInputs, RuleContext
+from impactcell.alarms.rules import batch_shift
+from impactcell.records import Evidence
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.messages import Messages
 from tests.browser.chromium import Browser
+from tests.snapshots import make_capture, make_snapshot
 
 pytestmark = pytest.mark.browser
 
@@ -81,9 +85,24 @@ def test_cycles_that_are_left_are_whole_ones_and_the_same_everywhere(browser: Br
         Wear__CyclesToLimitHigh=12345.6,
     )
     said = browser.run("return cyclesLeft(arguments[0])", content["values"])
-    assert said == "1234 (from 987 to 12,345)"
-    for path, part in (("", "1234"), ("Low", "987"), ("High", "12,345")):
+    assert said == "1234 (from 987 to 12345)"
+    for path, part in (("", "1234"), ("Low", "987"), ("High", "12345")):
         assert browser.run(SHOW, f"Wear/CyclesToLimit{path}", "cycles", content) == part
+
+
+@pytest.mark.parametrize("language", ["en", "de"])
+def test_the_number_of_a_cycle_is_written_as_in_the_text_of_an_alarm(browser: Browser, language: str) -> None:
+    load(browser, language)
+    shift = Evidence(change_cycle=1234567, size=0.03, size_std=0.002)
+    inputs = CycleInputs(1234567, make_snapshot(make_capture()).wear, shift=shift)
+    context = RuleContext(batch_shift.RULE.settings, active=False)
+    message = batch_shift.evaluate(inputs, context).message.text(language)
+    assert "1234567" in message
+    content = card(Friction__CycleNumber=1234567, Batch__LastShiftCycle=1234567)
+    assert browser.run(SHOW, "Friction/CycleNumber", "count", content) == "1234567"
+    assert browser.run(SHOW, "Batch/LastShiftCycle", "cycle", content) == "1234567"
+    large = card(Friction__SlidingDistance=98765.4, Friction__SlidingDistanceStdDev=60.0)
+    assert browser.run(SHOW, "Friction/SlidingDistance", "", large) == "98765 ± 120"
 
 
 def test_cycles_left_are_not_said_where_wear_is_not_known(browser: Browser) -> None:

@@ -7,7 +7,7 @@ const root = document.querySelector(".cell"), cell = root.dataset.cell;
 // A band of one value at each x is nothing but its edges.
 const edges = [{ colour: "edge", width: 1.5 }, { colour: "edge", width: 1.5 }];
 const tapSeries = [...edges, { colour: "curve", width: 1.5 }, { colour: "curve", width: 1.5 }];
-const millimetres = (value) => (value === null ? "–" : value.toLocaleString(document.documentElement.lang, { minimumFractionDigits: 3, maximumFractionDigits: 3 }));
+const millimetres = (value) => (value === null ? "–" : value.toLocaleString(document.documentElement.lang, { minimumFractionDigits: 3, maximumFractionDigits: 3, useGrouping: false }));
 const place = (id) => document.getElementById(id);
 const SHOWN_SHIFTS = 5; // in words; more make a text that nobody reads
 const sign = (shift) => (shift.size > 0 ? "▲" : "▼");

@@ -94,7 +94,7 @@ export class Chart {
       const isWhole = (value) => Math.abs(value - Math.round(value)) < 1e-6 * value;
       let decimals = 0;
       while (decimals < 12 && !isWhole(step * 10 ** decimals)) decimals++;
-      const numbers = new Intl.NumberFormat(lang, { minimumFractionDigits: decimals, maximumFractionDigits: decimals });
+      const numbers = new Intl.NumberFormat(lang, { minimumFractionDigits: decimals, maximumFractionDigits: decimals, useGrouping: false });
       return values.map((value) => (value === null ? "" : numbers.format(value)));
     };
     const range = (plot, low, high) => {

@@ -2,10 +2,10 @@
 export const texts = JSON.parse(document.getElementById("texts").textContent);
 const language = document.documentElement.lang;
 
-/** A number with so many significant digits; a dash where there is none. */
+/** A number with so many significant digits, its digits not in groups, as in what the service writes; a dash where there is none. */
 export function number(value, digits = 4) {
   if (value === null || value === undefined) return "–";
-  return new Intl.NumberFormat(language, { maximumSignificantDigits: digits, useGrouping: Math.abs(value) >= 1e4 }).format(value);
+  return new Intl.NumberFormat(language, { maximumSignificantDigits: digits, useGrouping: false }).format(value);
 }
 /** A friction coefficient: four decimals, as its scatter asks for. */
 export function coefficient(value) {
@@ -20,7 +20,7 @@ export const toldStd = (std) => `± ${new Intl.NumberFormat(language, { minimumS
 export function beside(std, value) {
   if (value === null || value === undefined) return "–";
   const decimals = Math.min(Math.max(1 - Number((TOLD_STDS * std).toExponential(1).split("e")[1]), 0), 15);
-  return new Intl.NumberFormat(language, { minimumFractionDigits: decimals, maximumFractionDigits: decimals, useGrouping: Math.abs(value) >= 1e4 }).format(value);
+  return new Intl.NumberFormat(language, { minimumFractionDigits: decimals, maximumFractionDigits: decimals, useGrouping: false }).format(value);
 }
 /** Cycles still to come: whole ones, and none that is not sure. */
 export const wholeCycles = (value) => (Number.isFinite(value) ? number(Math.floor(value), 10) : "–");
