@@ -10,7 +10,7 @@ from starlette.responses import RedirectResponse, Response
 from impactcell.alarms.rules import journal_fault
 from impactcell.errors import AccessError
 from impactcell.opcua.trust_list import der, read_certificate, thumbprint
-from impactcell.records import ModuleStatus
+from impactcell.records import Alarm, ModuleStatus
 from impactcell.scada import RefusedError, Role
 from impactcell.scada.users import User, read_users
 from impactcell.web.interface import CellFacts
@@ -26,7 +26,7 @@ class CellSystem:
     facts: CellFacts
     status: ModuleStatus
     journal_bytes: int
-    journal_fault: str
+    journal_fault: Alarm | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,4 +100,4 @@ def _cell_system(context: PageContext, facts: CellFacts) -> CellSystem:
         for path in (facts.journal, facts.journal.with_name(facts.journal.name + "-wal")):
             size += path.stat().st_size if path.exists() else 0
     fault = view.conditions.get(journal_fault.NAME)
-    return CellSystem(facts, view.status, size, fault.message if fault is not None and fault.active else "")
+    return CellSystem(facts, view.status, size, fault if fault is not None and fault.active else None)

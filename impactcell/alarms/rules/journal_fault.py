@@ -1,6 +1,7 @@
 """JournalFault: what the cell has measured cannot be stored."""
 
 from impactcell.alarms.rule import AlarmRule, ConditionClass, Message, RuleResult, RuleSettings
+from impactcell.german.journal_faults import german_journal_fault
 
 NAME = "JournalFault"
 """Published name."""
@@ -11,8 +12,9 @@ def result(reason: str) -> RuleResult:
     message = Message(
         f"Cycles cannot be stored: {reason}. The cell runs on, but what is not stored is lost with a "
         "restart. Make room or repair the disk.",
-        f"Zyklen können nicht gespeichert werden: {reason}. Die Zelle läuft weiter, doch was nicht "
-        "gespeichert ist, geht bei einem Neustart verloren. Platz schaffen oder Datenträger instand setzen.",
+        f"Zyklen können nicht gespeichert werden: {german_journal_fault(reason)}. Die Zelle läuft weiter, "
+        "doch was nicht gespeichert ist, geht bei einem Neustart verloren. Platz schaffen oder Datenträger "
+        "instand setzen.",
     )
     return RuleResult(NAME, bool(reason), message)
 
