@@ -279,8 +279,9 @@ class ModuleAcquisition:
         )
         cycle = received.cycle_id.cycle
         if received.missed:
+            are, them = ("is", "it") if received.missed == 1 else ("are", "them")
             self._log.warning(
-                "%d before it are lost: the module had overwritten them", received.missed, cycle=cycle
+                "%d before it %s lost: the module had overwritten %s", received.missed, are, them, cycle=cycle
             )
         for fault in received.faults:
             self._log.warning("%s", fault.removeprefix(f"{self.cell}: cycle {cycle}: "), cycle=cycle)

@@ -63,10 +63,10 @@ class FunctionCode(enum.IntEnum):
 
 
 _READS: Final[Mapping[FunctionCode, tuple[type[ModbusPDU], str]]] = {
-    FunctionCode.READ_COILS: (ReadCoilsRequest, "coils"),
-    FunctionCode.READ_DISCRETE: (ReadDiscreteInputsRequest, "discrete inputs"),
-    FunctionCode.READ_HOLDING: (ReadHoldingRegistersRequest, "holding registers"),
-    FunctionCode.READ_INPUT: (ReadInputRegistersRequest, "input registers"),
+    FunctionCode.READ_COILS: (ReadCoilsRequest, "coil"),
+    FunctionCode.READ_DISCRETE: (ReadDiscreteInputsRequest, "discrete input"),
+    FunctionCode.READ_HOLDING: (ReadHoldingRegistersRequest, "holding register"),
+    FunctionCode.READ_INPUT: (ReadInputRegistersRequest, "input register"),
 }
 """What encodes the request that reads each table, and what it reads."""
 _OF_BITS: Final = (FunctionCode.READ_COILS, FunctionCode.READ_DISCRETE)
@@ -137,10 +137,10 @@ def read_request(function: FunctionCode, address: int, count: int) -> Request:
     kind, what = _READS[function]
     most = MAX_READ_BITS if function in _OF_BITS else MAX_READ
     if not 1 <= count <= most or not 0 <= address <= 65_536 - count:
-        raise ValueError(f"a request cannot read {count} {what} from {address}")
+        raise ValueError(f"a request cannot read {_counted(count, what)} from {address}")
     pdu = bytes([function]) + kind(address=address, count=count).encode()
     data = -(-count // 8) if function in _OF_BITS else 2 * count
-    return Request(pdu, 2 + data, bytes([function, data]), f"{count} {what} from {address}")
+    return Request(pdu, 2 + data, bytes([function, data]), f"{_counted(count, what)} from {address}")
 
 
 def write_request(address: int, words: Words, table: str = "holding") -> Request:
@@ -158,7 +158,7 @@ def write_request(address: int, words: Words, table: str = "holding") -> Request
         return _write_coils(address, [bool(word) for word in words])
     if not 1 <= count <= MAX_WRITE or not 0 <= address <= 65_536 - count:
         raise ValueError(f"a request cannot write {count} registers from {address}")
-    description = f"a write of {count} registers from {address}"
+    description = f"a write of {_counted(count, 'register')} from {address}"
     values = [int(word) for word in words]
     if count == 1:
         single = WriteSingleRegisterRequest(address=address, registers=values)
@@ -173,7 +173,7 @@ def _write_coils(address: int, bits: list[bool]) -> Request:
     count = len(bits)
     if not 1 <= count <= MAX_WRITE_BITS or not 0 <= address <= 65_536 - count:
         raise ValueError(f"a request cannot write {count} coils from {address}")
-    description = f"a write of {count} coils from {address}"
+    description = f"a write of {_counted(count, 'coil')} from {address}"
     if count == 1:
         pdu = bytes([FunctionCode.WRITE_COIL]) + WriteSingleCoilRequest(address=address, bits=bits).encode()
         return Request(pdu, 5, pdu, description)
@@ -208,9 +208,14 @@ def read_write_request(address: int, count: int, write_address: int, words: Word
         read_address=address, read_count=count, write_address=write_address,
         write_registers=[int(word) for word in words],
     ).encode()  # fmt: skip
-    description = f"{count} holding registers from {address}, after a write of {written} from {write_address}"
+    read = _counted(count, "holding register")
+    description = f"{read} from {address}, after a write of {written} from {write_address}"
     pdu = bytes([FunctionCode.READ_WRITE]) + encoded
     return Request(pdu, 2 + 2 * count, bytes([FunctionCode.READ_WRITE, 2 * count]), description)
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def check_reply(request: Request, pdu: bytes) -> bytes:

@@ -7,12 +7,19 @@ from typing import Final
 from impactcell.german.system_errors import german_system_error
 
 REQUESTS: Final = {
-    r"(\d+) (?:(?:holding|input) registers|[a-z]+) from (\d+), after a write of (\d+) from (\d+)":
+    r"1 holding register from (\d+), after a write of (\d+) from (\d+)":
+        r"die Anfrage nach Register \1 nach dem Schreiben von \2 ab \3",
+    r"(\d+) holding registers from (\d+), after a write of (\d+) from (\d+)":
         r"die Anfrage nach \1 Registern ab \2 nach dem Schreiben von \3 ab \4",
+    r"1 (?:holding|input) register from (\d+)": r"die Anfrage nach Register \1",
     r"(\d+) (?:holding|input) registers from (\d+)": r"die Anfrage nach \1 Registern ab \2",
+    r"1 coil from (\d+)": r"die Anfrage nach Coil \1",
     r"(\d+) coils from (\d+)": r"die Anfrage nach \1 Coils ab \2",
+    r"1 discrete input from (\d+)": r"die Anfrage nach Diskreteingang \1",
     r"(\d+) discrete inputs from (\d+)": r"die Anfrage nach \1 Diskreteingängen ab \2",
+    r"a write of 1 register from (\d+)": r"das Schreiben von Register \1",
     r"a write of (\d+) registers from (\d+)": r"das Schreiben von \1 Registern ab \2",
+    r"a write of 1 coil from (\d+)": r"das Schreiben von Coil \1",
     r"a write of (\d+) coils from (\d+)": r"das Schreiben von \1 Coils ab \2",
     r"a change of bits of register (\d+)": r"das Ändern von Bits des Registers \1",
     "the device identification": "die Anfrage nach der Gerätekennung",

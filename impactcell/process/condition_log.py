@@ -11,6 +11,7 @@ from impactcell.process.cell_logger import CellLogger
 QUIET_CYCLES: Final = 20
 """Cycles without a condition after which it is over: one that comes and goes is one."""
 _NUMBER: Final = re.compile(r"[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+_PLURAL: Final = re.compile(r"\bcycles\b")
 
 
 @dataclass(slots=True)
@@ -34,7 +35,7 @@ class ConditionLog:
     def update(self, notes: Iterable[str], cycle: int) -> None:
         """Take what was noted of a cycle."""
         for note in notes:
-            kind = _NUMBER.sub("#", note)
+            kind = _PLURAL.sub("cycle", _NUMBER.sub("#", note))
             known = self._lasting.get(kind)
             if known is None:
                 self._log.log(logging.INFO, "%s", note, cycle=cycle)
@@ -44,7 +45,6 @@ class ConditionLog:
         for kind, known in list(self._lasting.items()):
             if not 0 <= cycle - known.last_cycle < QUIET_CYCLES:
                 del self._lasting[kind]
-                said = "over since cycle %d, %d cycles from %d on: %s"
-                self._log.log(
-                    logging.INFO, said, known.last_cycle + 1, known.count, known.since_cycle, known.text
-                )
+                cycles = "1 cycle" if known.count == 1 else f"{known.count} cycles"
+                said = "over since cycle %d, %s from %d on: %s"
+                self._log.log(logging.INFO, said, known.last_cycle + 1, cycles, known.since_cycle, known.text)

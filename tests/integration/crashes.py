@@ -23,7 +23,7 @@ from tests.integration.processes import simulator, write_cell
 PERIOD_S = 0.5
 LONGEST_LIFE = 2.0
 """A service is killed within so many periods after it has connected."""
-OVERWRITTEN = r"cycle=(\d+) (\d+) before it are lost: the module had overwritten them"
+OVERWRITTEN = r"cycle=(\d+) (\d+) before it (?:is|are) lost: the module had overwritten"
 
 
 @dataclass(frozen=True)

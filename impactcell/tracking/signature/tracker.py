@@ -135,7 +135,7 @@ def update(
     friction, std = friction_profile.friction(information, grid)
     missing = _missing_cycles(settings, state.reference)
     if missing:
-        reason = f"the reference is being learned, {missing} more cycles"
+        reason = f"the reference is being learned, {missing} more cycle{'s' * (missing != 1)}"
         signature = Signature(grid, friction, std, math.nan, math.nan, math.nan, Quality.UNCERTAIN, reason)
         return SignatureResult(
             update_reference(state, information, settings, None), signature, None, judged=False

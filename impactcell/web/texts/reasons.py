@@ -57,6 +57,8 @@ GERMAN: Final = {
         "noch wird kein Chargenwechsel gemeldet: die Größe des Rauschens wird noch gelernt",
     r"the batch id changes too often to say anything of batches":
         "die Charge wechselt zu oft, um etwas über Chargen zu sagen",
+    r"the reference is being learned, 1 more cycle":
+        "der Vergleich wird noch gelernt, ein weiterer Zyklus",
     r"the reference is being learned, (\d+) more cycles":
         r"der Vergleich wird noch gelernt, \1 weitere Zyklen",
     r"aborted by (.+)": r"abgebrochen von \1",

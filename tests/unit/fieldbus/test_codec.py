@@ -188,3 +188,15 @@ def test_the_reasons_for_framing_of_our_own_still_hold() -> None:
                 check_reply(read_request(FunctionCode.READ_HOLDING, 0, 1), each[2])
                 for each in FrameReader().feed(stream)
             ]
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_one_is_one_in_words(count: int) -> None:
+    end = "s" * (count - 1)
+    words = np.zeros(count, np.uint16)
+    assert (
+        read_request(FunctionCode.READ_HOLDING, 100, count).description
+        == f"{count} holding register{end} from 100"
+    )
+    assert write_request(40, words).description == f"a write of {count} register{end} from 40"
+    assert write_request(40, words, "coil").description == f"a write of {count} coil{end} from 40"

@@ -22,6 +22,22 @@ def test_a_line_when_it_begins_and_one_when_it_is_over(caplog: pytest.LogCapture
     ]
 
 
+def test_one_cycle_is_one_and_the_last_of_many_is_no_condition_of_its_own(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.INFO)
+    log = ConditionLog(CellLogger(logging.getLogger("cell"), "press-1"))
+    for cycle in range(1, 4):
+        log.update([f"learned in {4 - cycle} cycle{'s' * (cycle < 3)}", *(["odd"] * (cycle == 2))], cycle)
+    log.update([], 3 + QUIET_CYCLES)
+    assert [record.getMessage() for record in caplog.records] == [
+        "cell=press-1 cycle=1 learned in 3 cycles",
+        "cell=press-1 cycle=2 odd",
+        "cell=press-1 over since cycle 4, 3 cycles from 1 on: learned in 3 cycles",
+        "cell=press-1 over since cycle 3, 1 cycle from 2 on: odd",
+    ]
+
+
 def test_a_module_that_counts_anew_ends_what_was(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO)
     log = ConditionLog(CellLogger(logging.getLogger("cell"), "press-1"))

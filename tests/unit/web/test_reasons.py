@@ -56,6 +56,8 @@ def test_what_lies_outside_the_calibration_is_said_in_german() -> None:
 @pytest.mark.parametrize(
     ("english", "german"),
     [
+        ("the reference is being learned, 1 more cycle",
+         "der Vergleich wird noch gelernt, ein weiterer Zyklus"),
         ("the reference is being learned, 12 more cycles",
          "der Vergleich wird noch gelernt, 12 weitere Zyklen"),
         ("from the module's summary: no force was recorded",
