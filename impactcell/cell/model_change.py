@@ -21,8 +21,9 @@ def model_digest(model: Model) -> str:
 def in_place_of(before: Model, model: Model) -> Model:
     """Model that takes the place of another, and says so where that was provisional.
 
-    What was learned by a provisional model is learned anew: its friction was a guess. Until a cycle has come,
-    a second model takes the place of the provisional one as well.
+    What was learned by a provisional model is learned anew: its friction was a guess. So it is where a
+    provisional model comes back into service, which says that of itself. Until a cycle has come, a second
+    model takes the place of the provisional one as well.
     """
     digest = model_digest(before) if PROVISIONAL in before.provenance else before.provenance.get(REPLACED)
     if digest is None or PROVISIONAL in model.provenance:

@@ -22,7 +22,7 @@ from impactcell.alarms import (
     RuleResult,
     Transition,
 )
-from impactcell.cell.model_change import REPLACED, model_digest
+from impactcell.cell.model_change import PROVISIONAL, REPLACED, model_digest
 from impactcell.cell.preprocessing import (
     BatchNaming,
     CaptureDefaults,
@@ -141,7 +141,8 @@ def migrate_state(design: CellDesign, state: CellState) -> CellState:
     """Make a state fit the design: what is learned on another grid or by another model is learned anew.
 
     Another model moves the estimates, as another batch would, and what residuals are usual: the next cycle is
-    an expected change, and says nothing of the material. Wear learned by a provisional model is learned anew.
+    an expected change, and says nothing of the material. Wear learned by a provisional model is learned anew,
+    and so is wear where one comes into service: its friction, and how that scatters, are another's.
     """
     if state.grid != _grid(design):
         state = replace(state, signature=signature.initial_state(design.signature), grid=_grid(design))
@@ -149,7 +150,8 @@ def migrate_state(design: CellDesign, state: CellState) -> CellState:
     if state.model_digest == digest:
         return state
     has_changed = bool(state.model_digest)
-    if has_changed and design.model.provenance.get(REPLACED) == state.model_digest:
+    provenance = design.model.provenance
+    if has_changed and (PROVISIONAL in provenance or provenance.get(REPLACED) == state.model_digest):
         state = replace(state, tracker=TrackerState(clock=state.tracker.clock))
     gap = gap_cusum.GapState() if has_changed else state.gap
     return replace(state, gap=gap, model_digest=digest, model_changed=state.model_changed or has_changed)

@@ -110,8 +110,8 @@ def restore_model(cell: Path, *, as_json: bool = False) -> None:
     previous.write_bytes(in_service)
     if PROVISIONAL in model.provenance:
         print_note(
-            f"{model.name} is the guess that `impactcell model fit` replaced: nothing of it was measured, "
-            f"and wear and batches have learned by another model; fit again, or restore again"
+            f"{model.name} is the guess that `impactcell model fit` replaced: nothing of it was measured; "
+            f"wear and batches are learned anew by it, and anew once more when you fit again or restore again"
         )
     _tell(
         {"cell": cell_config.name, "model": model.name, "previous": str(previous)},

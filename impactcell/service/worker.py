@@ -226,7 +226,9 @@ class CellWorker:
         if fitted.signature is not state.signature:
             self.log.warning("the grid of the signature was changed: the signature is learned anew")
         if fitted.tracker is not state.tracker:
-            self.log.warning("the provisional model was replaced: wear and batches are learned anew")
+            is_guess = core.PROVISIONAL in design.model.provenance
+            what = "a provisional model is in service" if is_guess else "the provisional model was replaced"
+            self.log.warning("%s: wear and batches are learned anew", what)
         return fitted
 
     def _step(
