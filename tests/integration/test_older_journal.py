@@ -1,8 +1,6 @@
 """The service goes on from what an earlier version has learned, and says what it cannot go on from."""
 
 import asyncio
-import json
-import shutil
 import sqlite3
 from pathlib import Path
 from typing import Any
@@ -16,20 +14,17 @@ from impactcell.records import Alarm
 from impactcell.scada import Server
 from impactcell.serialization.message_pack import pack_tree, unpack_tree
 from tests.data.contents import described, stored, without_later_conditions
+from tests.data.journals import FORMATS, copy_journal, what_was_read
 from tests.data.make_journal import CELL, CELL_FILE
 from tests.integration.processes import write_cell
 from tests.integration.watched import serving
 from tests.patience import COMPILING_S
 
-DATA = Path(__file__).parents[1] / "data"
-
 
 @pytest.fixture
 def older(tmp_path: Path) -> Path:
     """Journal of `CELL`, as format 3 left it."""
-    path = tmp_path / f"{CELL}.sqlite"
-    shutil.copy(DATA / "journal-format-3.sqlite", path)
-    return path
+    return copy_journal(3, tmp_path / f"{CELL}.sqlite")
 
 
 def content(file: Path) -> bytes:
@@ -44,7 +39,9 @@ def learned(read: dict[str, Any]) -> dict[str, Any]:
     return {**read, "alarms": {**read["alarms"], "conditions": kept}, "transitions of alarms": told}
 
 
-async def test_the_service_goes_on_from_an_older_journal(tmp_path: Path, older: Path) -> None:
+@pytest.mark.parametrize("number", FORMATS)
+async def test_the_service_goes_on_from_an_older_journal(tmp_path: Path, number: int) -> None:
+    older = copy_journal(number, tmp_path / f"{CELL}.sqlite")
     async with serving(write_cell(tmp_path, 1, CELL, **CELL_FILE)) as watched:
         running = watched.service.running[CELL]
         await watched.alarm(CELL, "ModuleConnection", active=True)
@@ -56,7 +53,7 @@ async def test_the_service_goes_on_from_an_older_journal(tmp_path: Path, older: 
     with Journal(older, CELL, read_only=True) as journal:
         read = described(stored(journal), journal)
         assert not STATE.is_older(journal.state() or b"")
-    expected = json.loads((DATA / "journal-format-3.json").read_text(encoding="utf-8"))
+    expected = what_was_read(number)
     assert learned(without_later_conditions(read, expected)) == learned(expected)
 
 
