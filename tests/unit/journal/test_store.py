@@ -84,6 +84,15 @@ def test_cycle_numbers_may_come_again(tmp_path: Path) -> None:
         assert journal.last_cycle_id() == CycleId(1, 1)
 
 
+def test_a_state_that_is_replaced_is_not_written_over_as_well(tmp_path: Path) -> None:
+    state, log = bytes(200_000), tmp_path / "j-wal"
+    with Journal(tmp_path / "j", "c") as journal:
+        journal.record(state)
+        before = log.stat().st_size
+        journal.record(state)
+        assert log.stat().st_size - before < 1.3 * len(state)
+
+
 def test_a_failed_append_leaves_nothing_behind(tmp_path: Path) -> None:
     with Journal(tmp_path / "j", "c") as journal:
         append(journal, 1)
