@@ -1,8 +1,10 @@
 """`/healthz` and Prometheus `/metrics` over HTTP for the cells of a process; off unless the YAML says so."""
 
+import contextlib
 import json
 import logging
 import math
+import socket
 import sys
 import threading
 from collections.abc import Callable, Iterable, Mapping
@@ -69,8 +71,6 @@ def waiting_cell(cell: str) -> CellHealth:
 
 Health = Callable[[], Iterable[CellHealth]]
 
-POLL_S = 0.1
-"""How long the end of the service may wait for the listener."""
 PATIENCE_S = 5.0
 """How long a scraper may take to send its request, or to take the answer."""
 
@@ -174,15 +174,21 @@ class Monitoring:
                 f"monitoring: cannot listen on {self.host}:{self.port} ({error.strerror}); choose another"
             ) from error
         self.port = self._server.server_address[1]
-        self._thread = threading.Thread(
-            target=self._server.serve_forever, args=(POLL_S,), name="monitoring", daemon=True
-        )
+        self._is_ending = False
+        self._thread = threading.Thread(target=self._serve, name="monitoring", daemon=True)
         self._thread.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._server.shutdown()
+        self._is_ending = True
+        with contextlib.suppress(OSError):  # whoever connects wakes the thread
+            socket.create_connection((self.host, self.port), PATIENCE_S).close()
+        self._thread.join(PATIENCE_S)
         self._server.server_close()
-        self._thread.join()
+
+    def _serve(self) -> None:
+        """Wait for requests, for as long as nobody asks: `serve_forever` looks for its end by and by."""
+        while not self._is_ending:
+            self._server.handle_request()

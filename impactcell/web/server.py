@@ -30,6 +30,8 @@ KEEP_ALIVE_S: Final = 10
 """How long a connection without a request stays open."""
 SHUTDOWN_S: Final = 1
 """How long requests may take to end when the service ends."""
+DATE_S: Final = 1.0
+"""How often the date of the answers is made anew: it has whole seconds."""
 
 
 class _CutOff(logging.Filter):
@@ -41,6 +43,25 @@ class _CutOff(logging.Filter):
             record.msg, record.args, record.exc_info = "a request was cut off: the service ends", (), None
             record.levelno, record.levelname = logging.INFO, logging.getLevelName(logging.INFO)
         return True
+
+
+class _Server(uvicorn.Server):
+    """Told when to end, where uvicorn looks for it ten times a second."""
+
+    def __init__(self, config: uvicorn.Config) -> None:
+        super().__init__(config)
+        self._ending = asyncio.Event()
+
+    def end(self) -> None:
+        """End what is served; from its event loop."""
+        self.should_exit = True
+        self._ending.set()
+
+    async def main_loop(self) -> None:
+        """Date the answers until the end."""
+        while not await self.on_tick(0):
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._ending.wait(), DATE_S)
 
 
 class PageServer:
@@ -108,7 +129,7 @@ class PageServer:
         except (OSError, ssl.SSLError) as error:
             listener.close()
             raise SettingsError(f"page: {certificate} and {key} cannot be used: {error}") from error
-        self._server = uvicorn.Server(config)
+        self._server = _Server(config)
         self._listener = listener
         self._thread = threading.Thread(target=self._run, name="page", daemon=True)
         self._thread.start()
@@ -144,7 +165,7 @@ class PageServer:
     def _end(self) -> None:
         """End the streams first: the server waits for them."""
         self.feed.close()
-        self._server.should_exit = True
+        self._server.end()
 
 
 def _listen(host: str, port: int) -> socket.socket:
