@@ -100,7 +100,7 @@ def _surely_touching(channel: CheckedChannel, onset_std_s: float) -> CheckedChan
     """Leave out the samples that may lie before first contact."""
     if not onset_std_s:
         return channel
-    since = channel.time_s > LATEST_ONSET * onset_std_s
+    since = slice(int(np.searchsorted(channel.time_s, LATEST_ONSET * onset_std_s, "right")), None)
     return replace(channel, time_s=channel.time_s[since], values=channel.values[since])
 
 

@@ -206,7 +206,7 @@ def _fit_both_sides(response: LinearisedModel, prior: GaussianPrior, start: Samp
 
 def _over(form: Samples, parameters: int) -> Samples:
     """Give a linear form over all of theta: nothing of it follows what is known of the record."""
-    return form if len(form) == parameters else np.pad(form, (0, parameters - len(form)))
+    return np.concatenate([form, np.zeros(parameters - len(form))])
 
 
 def _likelier_side(
