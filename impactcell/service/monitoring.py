@@ -189,6 +189,6 @@ class Monitoring:
         self._server.server_close()
 
     def _serve(self) -> None:
-        """Wait for requests, for as long as nobody asks: `serve_forever` looks for its end by and by."""
+        """Wait for requests, however long nobody asks; the listener's own loop would look for its end."""
         while not self._is_ending:
             self._server.handle_request()

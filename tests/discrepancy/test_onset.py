@@ -35,9 +35,13 @@ def test_nothing_hidden_is_no_gap_and_each_onset_is_found() -> None:
     assert found.conclusion.verdict == "no_gap"
     # By the clock of the logger: of the first sample that is kept, less how long after contact it is.
     first_s = [float(shot.times[0][0]) for shot in found.problem.shots.items]
-    sizes = [len(shot.times[0]) for shot in found.problem.shots.items]
+    kept = [float(shot.values[0][0]) for shot in found.problem.shots.items]
     clocks = [given.shots[int(i)].force for i in found.training]
-    kept_s = [clock.time_s[-size] for clock, size in zip(clocks, sizes, strict=True) if clock is not None]
+    kept_s = [
+        float(clock.time_s[clock.values == first][0])
+        for clock, first in zip(clocks, kept, strict=True)
+        if clock is not None
+    ]
     contact_s = np.array(kept_s) - (np.array(first_s) - found.nominal.shot_parameters.onset_s)
     error = contact_s - np.array([onsets[int(i)] for i in found.training])
     assert error.std() < 0.02 * STEP_S

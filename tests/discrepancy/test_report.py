@@ -170,8 +170,9 @@ def test_an_interval_that_ends_at_a_bound_is_shown_as_one(
     tied: DiscrepancyResult, text_of_tied: str, tmp_path: Path
 ) -> None:
     assert "bound of its range" not in read(text_of_tied).text
-    ended = replace(tied.parameters[0], at_bound=True)
-    page = read(text_of(replace(tied, parameters=(ended, *tied.parameters[1:])), tmp_path))
+    ended = replace(tied.stated_parameters[0], at_bound=True)
+    stated = (ended, *tied.stated_parameters[1:])
+    page = read(text_of(replace(tied, stated_parameters=stated), tmp_path))
     assert page.text.count("bound of its range") == 1
 
 
