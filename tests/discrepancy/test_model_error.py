@@ -107,6 +107,31 @@ def test_a_penalty_adds_to_what_the_shots_know() -> None:
     assert held[0] == pytest.approx(free[0] / 4.0**2)
 
 
+def test_what_no_shot_tells_of_has_no_end_and_leaves_the_others_alone() -> None:
+    """Rounding of a derivative that is nought made every interval of a report garbage."""
+    rng = np.random.default_rng(6)
+    seen = np.array([[2.0, 0.5], [0.5, 1.0]])
+    gradient = rng.standard_normal((SHOTS, 2))
+    alone: Any = SimpleNamespace(
+        information=SHOTS * seen,
+        shot_gradient=gradient,
+        shot_information=np.repeat(seen[None], SHOTS, 0),
+        mean_squared_residual=1.0,
+    )
+    H = np.zeros((3, 3))
+    H[:2, :2] = seen
+    H[2, :2] = H[:2, 2] = 1e-17
+    beside: Any = SimpleNamespace(
+        information=SHOTS * H,
+        shot_gradient=np.column_stack([gradient, 1e-17 * gradient[:, 0]]),
+        shot_information=np.repeat(H[None], SHOTS, 0),
+        mean_squared_residual=1.0,
+    )
+    found = variances(beside)
+    assert found[:2] == pytest.approx(variances(alone))
+    assert found[2] == np.inf
+
+
 def _seen_by(shots: int, seed: int) -> float:
     """Number that so many of 40 shots tell of, over the standard deviation that is stated for it."""
     seen = np.arange(SHOTS) < shots

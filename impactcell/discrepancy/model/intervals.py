@@ -1,5 +1,6 @@
 """Intervals of the fitted parameters from the scatter between shots (sandwich, the shot as the cluster)."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from impactcell.records import Samples
 
 CONFIDENCE_LEVEL = 0.95
 """Probability with which intervals are to cover: `ci95` of `result.json`."""
+UNSEEN_SHARE = 1e-24
+"""Information on a coordinate, over the largest, below which it is rounding: no shot changes with it."""
 MAX_LEVERAGE = 0.98
 """Share of a shot's leverage that is taken out of its score, so that none divides by zero."""
 
@@ -66,25 +69,29 @@ def variances(
     drawn towards that which noise alone gives, at the level of the residuals where that is above one, as if
     `SHOTS_OF_NOISE` more shots had shown it (Smyth 2004). What all shots have in common does not scatter
     between them: shapes s_q of variance c_q add sum c_q (H^-1 s_q)^2. A penalty theta' P theta, shape (p, p),
-    adds P to H.
+    adds P to H. What no shot tells of at all has no end.
     """
     H = linearisation.information if penalty is None else linearisation.information + penalty
-    n, p = linearisation.shot_gradient.shape
-    scale = np.sqrt(np.maximum(np.diag(H), 1e-300))
+    seen = np.diag(H) > UNSEEN_SHARE * float(np.diag(H).max(initial=0.0))
+    H = H[np.ix_(seen, seen)]
+    n, p = len(linearisation.shot_gradient), len(H)
+    scale = np.sqrt(np.diag(H))
     inverse = np.linalg.pinv(H / np.outer(scale, scale), rcond=1e-12, hermitian=True) / np.outer(scale, scale)
     between_shots, parts = np.zeros(p), np.zeros((n, p))
     for i in range(n):
-        share = linearisation.shot_information[i] @ inverse
-        score = np.linalg.lstsq(np.eye(p) - MAX_LEVERAGE * share, linearisation.shot_gradient[i], rcond=None)
+        share = linearisation.shot_information[i][np.ix_(seen, seen)] @ inverse
+        gradient = linearisation.shot_gradient[i][seen]
+        score = np.linalg.lstsq(np.eye(p) - MAX_LEVERAGE * share, gradient, rcond=None)
         between_shots += (inverse @ score[0]) ** 2
         parts[i] = np.einsum("ab,ba->a", inverse, share)
     noise = parts.sum(0)
     shots = 1.0 / np.maximum(((parts / np.maximum(noise, 1e-300)) ** 2).sum(0), 1.0 / n)
     level = max(linearisation.mean_squared_residual, 1.0)
-    variance = (shots * between_shots + SHOTS_OF_NOISE * level * noise) / (shots + SHOTS_OF_NOISE)
+    variance = np.full(len(seen), math.inf)
+    variance[seen] = (shots * between_shots + SHOTS_OF_NOISE * level * noise) / (shots + SHOTS_OF_NOISE)
     if shared_error is not None:
-        variance += shared_error.variance @ (shared_error.shapes @ inverse) ** 2
-    return np.asarray(variance)
+        variance[seen] += shared_error.variance @ (shared_error.shapes[:, seen] @ inverse) ** 2
+    return variance
 
 
 def estimate_parameters(

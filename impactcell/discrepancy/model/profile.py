@@ -32,7 +32,7 @@ def profile_parameters(
 
     Along such a coordinate the others are refitted as far as the cost rises by no more than the squared
     quantile of the intervals (profile likelihood; Venzon and Moolgavkar 1988); their intervals hold those of
-    the optimum and of both ends. A coordinate whose interval is all its range is itself as uncertain as that.
+    the optimum and of both ends. A coordinate whose interval is all its range is as uncertain as it moves.
     """
     estimates = estimate_parameters(model, linearisation, shared_error)
     limit = interval_quantile(model, linearisation) ** 2 * max(linearisation.mean_squared_residual, 1.0)
@@ -46,7 +46,7 @@ def profile_parameters(
         for furthest in filter(None, reached):
             there = estimate_parameters(furthest, linearise(problem, furthest), shared_error)
             joined = join_intervals(joined, (*there[:column], *there[column + 1 :]))
-        if sorted(ends) == [coordinate.lower, coordinate.upper]:
+        if any(reached) and sorted(ends) == [coordinate.lower, coordinate.upper]:
             values = sorted(coordinate.value(float((one or model).theta[column])) for one in reached)
             own = replace(estimate, low=values[0], high=values[1])
             joined = (*joined[:column], own, *joined[column + 1 :])
