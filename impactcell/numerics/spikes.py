@@ -19,6 +19,8 @@ MAX_SPIKE_SAMPLES = 2
 """Samples in a row that are a spike; more is a motion, or a median of five would not see them."""
 BENDS = 3.0
 """The same in second differences of the samples beside it."""
+MAX_STEP = 0.5
+"""Step between the two sides, over the height of a spike: a sample between two jumps is none."""
 MARGIN = 4
 """Samples on either side by which a spike is told from what the signal does."""
 MIN_SAMPLES = 16
@@ -44,7 +46,8 @@ def spike_samples(values: Samples) -> NDArray[np.intp]:
 
     A spike is far from the median of five samples, under which an edge stays where it is; from the lines
     through the two samples before and the two after it, of which an edge, a kink and the last sample before a
-    jump are on one; and by more than the signal bends beside it, as a pulse of few samples does.
+    jump are on one; by more than the signal bends beside it, as a pulse of few samples does; and from two
+    sides that go on from each other, as those of a sample between two jumps do not.
     """
     none = np.empty(0, dtype=np.intp)
     if len(values) < MIN_SAMPLES:
@@ -85,8 +88,10 @@ def _are_spikes(values: Samples, first: NDArray[np.intp], width: int, least: flo
         np.median(np.column_stack([before[:, -2:], after[:, :2]]), axis=1),
     )
     away = np.min([np.abs(inside - line[:, None]).min(1) for line in lines], axis=0)
+    slope = 0.5 * (before[:, -1] - before[:, -2] + after[:, 1] - after[:, 0])
+    step = np.abs(after[:, 0] - before[:, -1] - (width + 1) * slope)
     bend = np.max([np.abs(np.diff(side, 2, axis=1)).max(1) for side in (before, after)], axis=0)
-    return np.asarray(away > np.maximum(least, BENDS * bend))
+    return np.asarray(away > np.max([np.full(len(away), least), BENDS * bend, step / MAX_STEP], axis=0))
 
 
 def _noise_by_bends(bends: Samples) -> float:

@@ -38,6 +38,8 @@ def test_jumps_kinks_and_peaks_are_no_spikes() -> None:
         contact(),
         np.where(at < 100, 7.0 * at, 700.0 - 16.0 * (at - 100)),  # a kink at the top
         np.where(at < 100, 7.0 * at, 200.0),  # a jump from the top
+        np.where(at < 100, 0.0, np.where(at < 101, 15.0, 6.0)),  # met again one sample before the halt
+        np.where(at < 100, -10.0, np.where(at < 102, 20.0, 6.0)),
         np.abs(200.0 * np.sin(at / 4.0)),  # contacts of few samples
         np.maximum(0.0, 200.0 * np.sin(at / 2.0)),
         np.round(at / 7.0),
