@@ -1,8 +1,9 @@
 """Why a journal cannot be written or was begun anew, in German."""
 
-import re
+from collections.abc import Callable, Mapping
 from typing import Final
 
+from impactcell.german.patterns import behind_names
 from impactcell.german.system_errors import german_system_error
 
 AS_IT_IS: Final = "sie bleibt, wie sie ist"
@@ -78,19 +79,12 @@ def german_journal_fault(reason: str) -> str:
     >>> german_journal_fault("/j.sqlite: the disk or its quota is full (database or disk is full); make room")
     '/j.sqlite: Datenträger oder Kontingent sind voll (kein Platz); Platz schaffen'
     """
-    parts = reason.split(": ")
-    for first in range(len(parts)):
-        said = ": ".join(parts[first:])
-        for pattern, german in GERMAN.items():
-            match = re.fullmatch(pattern, said)
-            if match is not None:
-                return ": ".join([*parts[:first], _expand(match, german)])
-    return reason
+    found = behind_names(reason, GERMAN, _WORDS)
+    return reason if found is None else ": ".join([*found[0], found[1]])
 
 
-def _expand(match: re.Match[str], german: str) -> str:
-    """Put what a pattern found into its sentence, faults and what the system says in German."""
-    words = {"fault": german_journal_fault, "system": german_system_error}
-    for name, text in match.groupdict().items():
-        german = german.replace(f"\\g<{name}>", words[name](text) if name in words else text or "")
-    return german
+_WORDS: Final[Mapping[str, Callable[[str], str]]] = {
+    "fault": german_journal_fault,
+    "system": german_system_error,
+}
+"""How what a pattern found is said, by the name of its group."""

@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Final
 
+from impactcell.german.patterns import behind_names, by_patterns
 from impactcell.german.system_errors import german_system_error
 
 REQUESTS: Final = {
@@ -112,40 +113,18 @@ def german_link_fault(reason: str) -> str:
     >>> german_link_fault("p: 2 holding registers from 100 refused: illegal data address (exception 2)")
     'p: die Anfrage nach 2 Registern ab 100 wird abgelehnt: diese Adresse gibt es dort nicht (Ausnahme 2)'
     """
-    parts = reason.split(": ")
-    for first in range(len(parts)):
-        said = ": ".join(parts[first:])
-        for pattern, german in GERMAN.items():
-            match = re.fullmatch(pattern, said)
-            if match is None:
-                continue
-            before = [re.sub(r" device (\d+)$", r" Gerät \1", part) for part in parts[:first]]
-            return ": ".join([*before, re.sub(r"(?<=\d)\.(?=\d+ s)", ",", _expand(match, german))])
-    return reason
-
-
-def _expand(match: re.Match[str], german: str) -> str:
-    """Put what a pattern found into its sentence, each in German."""
-    for name, text in match.groupdict().items():
-        german = german.replace(f"\\g<{name}>", _WORDS.get(name, str)(text))
-    for place, text in enumerate(match.groups(), 1):
-        german = german.replace(f"\\{place}", text)
-    return german
-
-
-def _first(patterns: dict[str, str], text: str) -> str:
-    """Say a text by the first pattern that it fits."""
-    for pattern, german in patterns.items():
-        match = re.fullmatch(pattern, text)
-        if match is not None:
-            return match.expand(german)
-    return text
+    found = behind_names(reason, GERMAN, _WORDS)
+    if found is None:
+        return reason
+    names, german = found
+    before = [re.sub(r" device (\d+)$", r" Gerät \1", name) for name in names]
+    return ": ".join([*before, re.sub(r"(?<=\d)\.(?=\d+ s)", ",", german)])
 
 
 _WORDS: Final[Mapping[str, Callable[[str], str]]] = {
-    "request": lambda text: _first(REQUESTS, text),
+    "request": lambda text: by_patterns(text, REQUESTS, {}) or text,
     "exception": lambda text: EXCEPTIONS.get(text, text),
     "system": german_system_error,
-    "shown": lambda text: "; ".join(_first(SHOWN, part) for part in text.split("; ")),
+    "shown": lambda text: "; ".join(by_patterns(part, SHOWN, {}) or part for part in text.split("; ")),
 }
 """How what a pattern found is said, by the name of its group."""

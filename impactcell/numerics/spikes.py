@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-Samples = NDArray[np.float64]
+from impactcell.records import Samples
 
 NORMAL_SCALE = 1.4826
 """Standard deviation over median absolute deviation of a normal distribution."""
@@ -15,10 +15,10 @@ SPIKE_SHARE = 2e-3
 neighbours."""
 RASTER_STEPS = 3.0
 """The same in steps of a coarse raster, over which noise jumps by one or two."""
-MAX_SPIKE_SAMPLES = 2
-"""Samples in a row that are a spike; more is a motion, or a median of five would not see them."""
 BENDS = 3.0
 """The same in second differences of the samples beside it."""
+MAX_SPIKE_SAMPLES = 2
+"""Samples in a row that are a spike; more is a motion, or a median of five would not see them."""
 MAX_STEP = 0.5
 """Step between the two sides, over the height of a spike: a sample between two jumps is none."""
 MARGIN = 4
