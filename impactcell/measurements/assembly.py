@@ -32,7 +32,7 @@ DRIVE_REVERSAL = 0.25
 """Force of the other sign as a share of the largest from which on it drives both ways; a contact only
 pushes."""
 
-ROTATING = (Dimension.TORQUE, Dimension.ANGLE, Dimension.INERTIA)
+ROTATING = (Dimension.TORQUE, Dimension.ANGLE, Dimension.ANGULAR_VELOCITY, Dimension.INERTIA)
 """Units of force, position and mass where the coordinate is an angle."""
 
 
@@ -66,7 +66,8 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     check_channels_alike(records, mapping)
     notes = _said_of(tables, given)
     excitation = given.excitation or _excitation(records, notes)
-    _check_channels(records, excitation)
+    _check_channels(records, mapping, excitation)
+    notes += _of_sums(mapping, excitation)
     check_scalars_alike(tables, mapping, excitation)
     notes += left_empty(tables, records, mapping)
     coordinate = _coordinate(mapping, excitation)
@@ -173,7 +174,33 @@ def _excitation(records: Sequence[Record], notes: list[str]) -> Excitation:
     return Excitation.TAP
 
 
-def _check_channels(records: Sequence[Record], excitation: Excitation) -> None:
+def _of_sums(mapping: Mapping, excitation: Excitation) -> list[str]:
+    """Tell a position that was summed up from a speed, which a tap is too short and exact for.
+
+    Raises
+    ------
+    MeasurementError
+        The records are of taps.
+    """
+    position = mapping.of(ColumnMeaning.POSITION)
+    if position is None or not position.summed_up:
+        return []
+    name = position.column
+    if excitation is Excitation.TAP:
+        raise MeasurementError(
+            f"column {name!r} is a speed, whose noise adds up in a position; of a tap the position has to be "
+            f"measured: leave the column out with --column 'ignored={name}', or say --excitation driven for "
+            f"what is no tap"
+        )
+    return [
+        (
+            f"position summed up from the speed {name!r}, from 0 at the first sample of each record: where "
+            f"that was is not known"
+        )
+    ]
+
+
+def _check_channels(records: Sequence[Record], mapping: Mapping, excitation: Excitation) -> None:
     needed = {
         Excitation.TAP: {ColumnMeaning.FORCE},
         Excitation.FREE_SLIDE: {ColumnMeaning.POSITION},
@@ -181,11 +208,22 @@ def _check_channels(records: Sequence[Record], excitation: Excitation) -> None:
     }[excitation]
     lacking = [
         f"{record.place}: has no {' and no '.join(sorted(needed - set(record.values)))}, which a campaign of "
-        f"excitation {excitation} needs"
+        f"excitation {excitation} needs; {_way_to_channel(mapping)}"
         for record in records
         if needed - set(record.values)
     ]
     raise_faults(lacking)
+
+
+def _way_to_channel(mapping: Mapping) -> str:
+    """Say how what is needed can be given."""
+    speed = mapping.of(ColumnMeaning.VELOCITY)
+    if speed is not None and mapping.of(ColumnMeaning.POSITION) is None:
+        return (
+            f"where {speed.column!r} is the speed of what moves, --column 'position={speed.column}' sums it "
+            f"up; else name the column, as with --column position=NAME"
+        )
+    return "name the column, as with --column force=NAME, or say another --excitation"
 
 
 def _whole(number: int, record: Record, given: Given) -> Capture:

@@ -11,6 +11,7 @@ from impactcell.measurements.moments import unread_moments
 from impactcell.measurements.recognition import (
     CHANNELS,
     ROTATION_WORDS,
+    SPEED_OF,
     VOCABULARY,
     WORD_MATCH,
     ColumnMeaning,
@@ -58,6 +59,12 @@ class Assignment:
     confidence: float
     why: str
 
+    @property
+    def summed_up(self) -> bool:
+        """Whether this is a position of which the speed was recorded."""
+        of_speed = self.unit is not None and self.unit.dimension in SPEED_OF.values()
+        return of_speed and self.meaning is ColumnMeaning.POSITION
+
 
 def ascends(values: Samples) -> bool:
     """Whether a column goes forward in nearly all of its steps, as a time does."""
@@ -78,9 +85,10 @@ def lacking(
     if ColumnMeaning.TIME not in present and any(
         sampling_step_s(table, constants) is None for table in tables
     ):
+        unused = {item.column for item in assignments if item.meaning is ColumnMeaning.IGNORED}
         faults.append(
-            f"no column of time was found{_no_time(tables)}; name it with --column time=NAME, or give its "
-            f"rate, as --set rate=10kHz"
+            f"no column of time was found{_no_time(tables, unused)}; name it with --column time=NAME, or "
+            f"give its rate, as --set rate=10kHz"
         )
     if not {ColumnMeaning.POSITION, ColumnMeaning.FORCE} & present:
         names = ", ".join(repr(item.column) for item in assignments)
@@ -97,7 +105,7 @@ def _of_column(item: Assignment) -> list[str]:
     faults = []
     if item.unit is None:
         faults.append(no_unit(item))
-    elif item.unit.dimension not in VOCABULARY[item.meaning].dimensions:
+    elif item.unit.dimension not in VOCABULARY[item.meaning].dimensions and not item.summed_up:
         faults.append(
             f"column {item.column!r} ({item.meaning}) is in {item.unit.symbol}; "
             f"{_way_to_unit(item, item.meaning, item.unit)}"
@@ -124,6 +132,8 @@ def _way_to_unit(item: Assignment, meaning: ColumnMeaning, unit: MeasuredUnit) -
     """Say how a column that is in a unit of something else can be used as a quantity."""
     fitting = VOCABULARY[meaning].dimensions[0].value
     way = f"give its unit with --unit '{item.column}={fitting}'"
+    if meaning is ColumnMeaning.POSITION and unit.dimension in SPEED_OF.values():
+        return f"say --column 'position={item.column}' to have the speed summed up, or {way}"
     if meaning not in CHANNELS or unit.dimension not in SIGNALS:
         return way
     signal = "" if unit.dimension is Dimension.NONE else f"/{unit.symbol}"
@@ -151,8 +161,8 @@ def _contradictions(assignments: Sequence[Assignment]) -> list[str]:
     return faults
 
 
-def _no_time(tables: Sequence[Table]) -> str:
-    """Say why a column that is called as the time is none."""
+def _no_time(tables: Sequence[Table], unused: AbstractSet[str]) -> str:
+    """Say why a column that is called as the time is none, or which `unused` one goes up as a time does."""
     for table in tables:
         for column in table.columns:
             if name_score(column.name, ColumnMeaning.TIME)[0] < WORD_MATCH:
@@ -163,6 +173,13 @@ def _no_time(tables: Sequence[Table]) -> str:
             if not ascends(column.values):
                 steps = np.diff(column.values)
                 return f": {column.name!r} goes forward in {np.sum(steps > 0.0)} of {steps.size} steps only"
+    for table in tables:
+        for column in table.columns:
+            if column.name not in unused or column.text is not None or not ascends(column.values):
+                continue
+            step = float(np.median(np.diff(column.values)))
+            if step != round(step):
+                return f": {column.name!r} goes up by {step:.6g} a row and may be it, in a unit to be said"
     return ""
 
 

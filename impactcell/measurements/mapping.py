@@ -16,6 +16,7 @@ from impactcell.measurements.column_units import (
 )
 from impactcell.measurements.gains import Gain
 from impactcell.measurements.recognition import (
+    SPEED_OF,
     UNIT_ALONE,
     UNIT_MATCH,
     VOCABULARY,
@@ -34,8 +35,6 @@ PRIORITY = (
     ColumnMeaning.BATCH, ColumnMeaning.DWELL, ColumnMeaning.START,
 )  # fmt: skip
 """Order in which equally sure guesses are taken."""
-SPEED_OF = {Dimension.LENGTH: Dimension.VELOCITY, Dimension.ANGLE: Dimension.ANGULAR_VELOCITY}
-"""What a position changes by in time."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from impactcell.campaign import LARGEST
 from impactcell.errors import MeasurementError
@@ -148,8 +149,14 @@ def _record(table: Table, place: str, mapping: Mapping, faults: list[str]) -> Re
             faults.append(f"{table.title}: column {column.name!r} ({meaning}) has no value at all")
         else:
             times[meaning] = time[present]
-            values[meaning] = item.unit.factor * mapping.given.signs.get(meaning, 1) * column.values[present]
+            measured = item.unit.factor * mapping.given.signs.get(meaning, 1) * column.values[present]
+            values[meaning] = _summed_up(times[meaning], measured) if item.summed_up else measured
     return Record(place, times, values, scalars_of(table, place, mapping, faults))
+
+
+def _summed_up(time_s: Samples, speed: Samples) -> Samples:
+    """Position of a speed [m/s or rad/s], from 0 at the first sample, by the trapezoidal rule."""
+    return np.asarray(cumulative_trapezoid(speed, time_s, initial=0), dtype=np.float64)
 
 
 def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:

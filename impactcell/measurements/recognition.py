@@ -95,6 +95,8 @@ VOCABULARY = {
     ColumnMeaning.START: Words("start start_position startposition startlage", "", (Dimension.LENGTH,)),
 }
 """How columns are called."""
+SPEED_OF = {Dimension.LENGTH: Dimension.VELOCITY, Dimension.ANGLE: Dimension.ANGULAR_VELOCITY}
+"""What a position changes by in time; a column of it that is given as the position is summed up."""
 ROTATION_WORDS = frozenset(
     ("torque", "moment", "drehmoment", "tau", "angle", "winkel", "encoder", "theta", "phi")
 )

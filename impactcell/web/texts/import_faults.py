@@ -3,7 +3,7 @@
 import re
 from typing import Final, NamedTuple
 
-from impactcell.german.findings import GERMAN_QUANTITIES
+from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES
 from impactcell.web.texts.import_notes import page_note
 
 PLACE: Final = r"(?P<place>(?:.+?: )?)"
@@ -120,6 +120,26 @@ FAULTS: Final = (
         "Dateien einzeln ablegen",
     ),
     _Fault(
+        r"has no (?P<meanings>[a-z ]+), which a campaign of excitation (?P<kind>\w+) needs; where "
+        r"(?P<quote>['\"])(?P<column>.+?)(?P=quote) is the speed .*",
+        "has no {meanings}, which a campaign of excitation {kind} needs; where “{column}” is the speed of "
+        "what moves, choose it as the position in the form below, and it is summed up",
+        "ohne „{meanings}“, für Anregung „{kind}“ nötig; ist „{column}“ die Geschwindigkeit dessen, was sich "
+        "bewegt, sie unten im Formular als Position wählen: sie wird aufsummiert",
+    ),
+    _Fault(
+        r"has no (?P<meanings>[a-z ]+), which a campaign of excitation (?P<kind>\w+) needs; name the .*",
+        "has no {meanings}, which a campaign of excitation {kind} needs; choose the column in the form below",
+        "ohne „{meanings}“, für Anregung „{kind}“ nötig; die Spalte unten im Formular wählen",
+    ),
+    _Fault(
+        COLUMN + r" is a speed, whose noise adds up in a position; .*",
+        "column “{column}” is a speed, whose noise adds up in a position; of a tap the position has to be "
+        "measured: choose another column in the form below",
+        "Spalte „{column}“ ist eine Geschwindigkeit, deren Rauschen sich in der Position aufsummiert; bei "
+        "einem Stoß muss die Position gemessen sein: unten im Formular eine andere Spalte wählen",
+    ),
+    _Fault(
         r"has no (?P<meaning>\w+), which (?P<other>.+) says beside its columns; say it here too, .*",
         "has no {meaning}, which {other} says beside its columns; say it here too, or give it for all "
         "shots in the form below",
@@ -204,6 +224,8 @@ REASONS: Final = (
     (r": '(?P<column>.+)' holds text, as '(?P<text>.*)'", ": „{column}“ enthält Text, etwa „{text}“"),
     (r": '(?P<column>.+)' goes forward in (?P<some>\d+) of (?P<all>\d+) steps only",
      ": „{column}“ wächst nur in {some} von {all} Schritten"),
+    (r": '(?P<column>.+)' goes up by (?P<step>\S+) a row and may be it, in a unit to be said",
+     ": „{column}“ wächst je Zeile um {step} und könnte sie sein; dann auch die Einheit angeben"),
     (r": its column changes within the record, so it was measured",
      ": ihre Spalte ändert sich in der Aufzeichnung, ist also gemessen"),
 )  # fmt: skip
@@ -235,6 +257,10 @@ def _in_german(said: dict[str, str]) -> dict[str, str]:
             why = german.format_map(match.groupdict())
     return {
         "meaning": GERMAN_QUANTITIES.get(meaning, meaning),
+        "meanings": "“ und „".join(
+            GERMAN_QUANTITIES.get(name, name) for name in said.get("meanings", "").split(" and no ")
+        ),
+        "kind": GERMAN_PHASES.get(said.get("kind", ""), said.get("kind", "")),
         "needed": NEEDED.get(needed, needed),
         "reason": page_note(said.get("reason", ""), "de")[1],
         "why": why,

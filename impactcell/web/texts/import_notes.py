@@ -14,6 +14,10 @@ GERMAN: Final = {
     r"excitation driven: the force acts all the time or both ways":
         "Anregung durch eine Kraft, die ständig oder in beiden Richtungen wirkt",
     r"force turned: it was negative in compression": "Kraft umgekehrt: sie war bei Druck negativ",
+    r"position summed up from the speed (['\"])(.+)\1, from 0 at the first sample of each record: where that "
+    r"was is not known":
+        r"Position aus der Geschwindigkeit „\2“ aufsummiert, ab 0 beim ersten Messwert jeder Aufzeichnung: "
+        "wo das war, ist nicht bekannt",
     r"(\d+) records cut into (\d+) taps where the force begins anew":
         r"\1 Aufzeichnungen in \2 Stöße geteilt, wo die Kraft neu beginnt",
     r"t = 0 put where the force begins, in (\d+) taps?, good to a part of the sampling step of (\S+) ms; "

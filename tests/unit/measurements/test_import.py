@@ -172,7 +172,12 @@ WAVE = np.sin(40.0 * TIME)
             "column 't' (time) has no unit; say --unit 't=s'",
         ),
         ({"t": ("s", TIME), "F": ("N", WAVE), "x": (None, WAVE)}, "column 'x' (position) has no unit"),
-        ({"F": ("N", WAVE), "x": ("m", WAVE)}, "no column of time was found"),
+        ({"F": ("N", WAVE), "x": ("m", WAVE)}, "no column of time was found; name it"),
+        (
+            {"a": (None, TIME), "n": (None, 1e3 * TIME), "F": ("N", WAVE), "x": ("m", WAVE)},
+            "no column of time was found: 'a' goes up by 0.001 a row and may be it, in a unit to be said",
+        ),
+        ({"n": (None, np.round(1e3 * TIME)), "F": ("N", WAVE)}, "no column of time was found; name it"),
         ({"t": ("s", TIME), "u": ("V", WAVE)}, "neither position nor force was found among 't', 'u'"),
         ({"t": ("s", TIME), "a": ("m", WAVE), "b": ("m", WAVE)}, "may be the position"),
         ({"t": ("s", TIME % 0.1), "F": ("N", WAVE), "x": ("m", WAVE)}, "time does not increase"),

@@ -17,6 +17,7 @@ FILES = {
     "time as text": "Zeit;Kraft [N]\num eins;2\num zwei;3\num drei;5\n",
     "time to and fro": "Zeit [s];Kraft [N]\n1;2\n0;3\n3;5\n2;7\n",
     "no unit": "Zeit [ms];Kraft [N];Weg\n0;0;0\n1;1;1\n2;0;2\n3;0;3\n",
+    "time without a name": "a;Kraft [N]\n0;2\n0,25;3\n0,5;5\n0,75;7\n",
     "unit of something else": "Zeit [ms];Kraft [mm];Weg [mm]\n0;0;0\n1;1;1\n2;0;2\n3;0;3\n",
     "no contact": f"Zeit [ms];Kraft [N];Weg [mm];Geschwindigkeit [mm/min]\n{ZEROS}",
     "two masses": "Zeit [ms];Kraft [N];Masse [kg]\n"
@@ -52,6 +53,33 @@ def test_a_fault_is_said_without_options_in_both_languages(tmp_path: Path, case:
             assert spoken == language, fault
             assert "--" not in said, said
             assert "form below" in said or "Formular" in said, said
+
+
+SPEED = "Zeit [ms];v [m/s];Kraft [N]\n" + "".join(f"{n};{(n * n) % 7 - 3};{n % 5 - 2}\n" for n in range(60))
+
+
+def test_a_speed_where_a_position_is_needed_is_told_in_both_languages(tmp_path: Path) -> None:
+    (fault,) = faults_of(tmp_path, SPEED, read_given({}, excitation="driven"))
+    assert page_fault(fault, "de")[1].endswith(
+        "ohne „Position“, für Anregung „angetriebene Bewegung“ nötig; ist „v“ die Geschwindigkeit dessen, "
+        "was sich bewegt, sie unten im Formular als Position wählen: sie wird aufsummiert"
+    )
+    assert page_fault(fault, "en")[1].endswith(
+        "choose it as the position in the form below, and it is summed up"
+    )
+    given = read_given({"columns": ["force=a"], "units": ["a=N"]}, excitation="driven")
+    (fault,) = faults_of(tmp_path, SPEED.replace("v [m/s];Kraft [N]", "a;b"), given)
+    assert page_fault(fault, "de")[1].endswith(
+        "ohne „Position“, für Anregung „angetriebene Bewegung“ nötig; die Spalte unten im Formular wählen"
+    )
+
+
+def test_the_speed_of_a_tap_is_refused_in_both_languages(tmp_path: Path) -> None:
+    given = read_given({"columns": ["position=v"]}, excitation="tap")
+    (fault,) = faults_of(tmp_path, SPEED, given)
+    assert "deren Rauschen sich in der Position aufsummiert" in page_fault(fault, "de")[1]
+    assert "whose noise adds up in a position" in page_fault(fault, "en")[1]
+    assert "--" not in page_fault(fault, "en")[1]
 
 
 def test_a_rate_beside_times_is_told_to_have_no_use(tmp_path: Path) -> None:
