@@ -75,4 +75,5 @@ def blamed_on_delay(steps: list[SelectionStep], explained: tuple[float, float] |
 def _words(explained: tuple[float, float]) -> str:
     delay_s, share = explained
     when = "late" if delay_s > 0.0 else "early"
-    return f"a force recorded {1e3 * abs(delay_s):.2g} ms {when} would explain {100.0 * share:.0f} %"
+    off_ms = float(f"{1e3 * abs(delay_s):.2g}")
+    return f"a force recorded {off_ms:g} ms {when} would explain {100.0 * share:.0f} %"
