@@ -102,6 +102,7 @@ def test_the_page_is_whole_and_fetches_nothing(text_of_tied: str) -> None:
     assert page.pictures == 4  # two maps, the traces, the friction factors
     assert all(as_title(phrase(effect)) in page.text for effect in LIBRARY)
     assert "weigh the part" in page.text
+    assert "the intervals hold whichever of the effects that these shots cannot tell apart" in page.text
 
 
 def test_the_first_screen_says_what_it_means_and_what_to_do(
@@ -151,6 +152,7 @@ def test_an_unknown_gap_leads_to_the_guide(unknown: DiscrepancyResult, tmp_path:
     assert unknown.unexplained is not None
     assert f"largest in phase {phrase(unknown.unexplained.phase)}" in page.text
     assert "→" not in page.text
+    assert "the intervals hold whichever" not in page.text
     assert headline(unknown).startswith("No known effect explains a held-out gap of")
 
 
