@@ -247,12 +247,13 @@ for seed in (2, 4):
 """
 
 
-def test_a_level_that_swings_leaves_the_slopes_finite_and_near_in_memory_that_is_theirs(tmp_path):
+def test_a_level_that_swings_leaves_the_slopes_finite_and_near_in_memory_that_is_theirs(cache):
     """A segment without probability stood before others: all were dropped, and the next wrote past the end.
 
     By the compiler's own check of bounds, in a process of its own. Then slopes ran off along a level tail.
     """
-    environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
+    machine_code = cache.mkdir("bounds-checked")  # kept, as all other machine code is
+    environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(machine_code)}
     done = subprocess.run(
         [sys.executable, "-c", SWINGING], env=environment, capture_output=True, text=True, check=False
     )
