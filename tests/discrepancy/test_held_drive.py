@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from impactcell.campaign import Campaign, Excitation
-from impactcell.discrepancy.machine import BaseModel, NumberPrior, investigate_machine
+from impactcell.discrepancy.machine import BaseModel, MachineFinding, NumberPrior, investigate_machine
 from impactcell.discrepancy.machine.uniform_records import uniform_records
 from impactcell.discrepancy.report.german_notes import note as german_note
 from impactcell.discrepancy.report.machine_result import machine_document
@@ -56,8 +56,14 @@ def cart(late: int) -> tuple[Capture, ...]:
     return tuple(shots)
 
 
+@lru_cache
+def found() -> MachineFinding:
+    """What comes of the records whose command acts at once."""
+    return investigate_machine(Campaign(Excitation.DRIVEN, cart(0)), CART)
+
+
 def test_the_steps_of_a_switched_drive_are_no_noise_and_act_until_the_next() -> None:
-    finding = investigate_machine(Campaign(Excitation.DRIVEN, cart(0)), CART)
+    finding = found()
     result = machine_document(finding)
     assert result["noise_floor"]["noise_std"][0] == 0.0
     assert (finding.verdict, finding.established) == ("named", ("viscous_friction",))
@@ -77,7 +83,7 @@ def test_the_steps_of_a_switched_drive_are_no_noise_and_act_until_the_next() -> 
 
 def test_where_a_stretch_lies_is_no_motion_that_a_model_predicts() -> None:
     """Places are half a metre apart, the motion about each is a centimetre."""
-    finding = investigate_machine(Campaign(Excitation.DRIVEN, cart(0)), CART)
+    finding = found()
     error = finding.simulated[0]
     held = [finding.records[place].position for place, _, _ in finding.held_spans]
     varying = np.concatenate([position - position.mean() for position in held])
