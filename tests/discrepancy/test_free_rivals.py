@@ -57,6 +57,7 @@ def test_an_effect_is_named_and_measured_beside_a_force_of_which_nobody_knows_th
     assert beside.high - beside.low < 0.5 * (alone.high - alone.low)  # what remains pulls less
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [600_000])
 def test_a_force_of_which_nobody_knows_the_form_is_named_after_nothing(seed: int) -> None:
     found = _investigated(("wandering_force",), (0.2,), seed)

@@ -36,6 +36,7 @@ def test_three_effects_are_named_each_with_what_it_closes_of_what_the_others_lea
     assert all(np.mean(pair.residual**2) > POLICY.max_rms_at_floor**2 for pair in pairs)
 
 
+@pytest.mark.long
 def test_a_law_of_no_library_beside_two_effects_is_not_given_three_names(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

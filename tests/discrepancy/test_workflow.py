@@ -189,6 +189,7 @@ def test_a_shape_at_the_end_of_its_range_is_not_a_name() -> None:
     assert answer(found) == ("unknown", set())
 
 
+@pytest.mark.long
 def test_an_effect_of_no_library_is_unknown_and_nothing_is_listed() -> None:
     found = investigated("actuator_vibration", shots=18)
     outcome = result_document(found)

@@ -48,6 +48,7 @@ def test_an_effect_that_the_model_knows_makes_no_cycle_deviant(seed: int) -> Non
     assert deviant_cycles(design, seed, 90) == []
 
 
+@pytest.mark.long
 def test_an_effect_of_every_cycle_is_soon_how_cycles_vary() -> None:
     """The model has not taken it over: slow cycles deviate, others between them do not; 0 to 12 of 135."""
     design = cell_design(read_cell(CONFIG / "cells" / "new-effect.yaml"))
