@@ -103,7 +103,7 @@ class Browser:
         """Wait until a condition gives something."""
         # A page that gives way to the next one, or renews a part of itself.
         changing = (StaleElementReferenceException, ElementNotInteractableException)
-        wait = WebDriverWait(self.driver, patience_s, poll_frequency=0.02, ignored_exceptions=changing)
+        wait = WebDriverWait(self.driver, patience_s, poll_frequency=0.05, ignored_exceptions=changing)
         try:
             return wait.until(lambda _: condition())
         except TimeoutException:
