@@ -18,24 +18,29 @@ def kinds(module: _syntax.Module) -> Counter[str]:
     A docstring is any string that stands alone as a statement, those below fields and constants too; a blank
     line inside of one belongs to it.
     """
-    documented = set(_documented(module.tree))
-    tokens = tokenize.generate_tokens(io.StringIO("\n".join(module.lines) + "\n").readline)
-    commented = {token.start[0] for token in tokens if token.type == tokenize.COMMENT}
+    documented = set(_documented(module.nodes))
+    signed = {number for number, line in enumerate(module.lines, 1) if line.lstrip().startswith("#")}
+    commented = signed & _commented(module.lines) if signed - documented else set()
     counts = Counter[str]()
     for number, line in enumerate(module.lines, 1):
         if number in documented:
             counts["docstrings"] += 1
         elif not line.strip():
             counts["blank"] += 1
-        elif number in commented and line.lstrip().startswith("#"):
+        elif number in commented:
             counts["comments"] += 1
         else:
             counts["code"] += 1
     return counts
 
 
-def _documented(tree: ast.Module) -> Iterator[int]:
-    alone = (node.value for node in ast.walk(tree) if isinstance(node, ast.Expr))
+def _commented(lines: Sequence[str]) -> set[int]:
+    tokens = tokenize.generate_tokens(io.StringIO("\n".join(lines) + "\n").readline)
+    return {token.start[0] for token in tokens if token.type == tokenize.COMMENT}
+
+
+def _documented(nodes: Iterable[ast.AST]) -> Iterator[int]:
+    alone = (node.value for node in nodes if isinstance(node, ast.Expr))
     for node in alone:
         if isinstance(node, ast.Constant) and isinstance(node.value, str):
             yield from range(node.lineno, (node.end_lineno or node.lineno) + 1)

@@ -110,9 +110,8 @@ def definitions(parsed: Sequence[_syntax.Module], patterns: Sequence[str]) -> Co
     return Count(len(items), tuple(items))
 
 
-def measure(root: Path) -> dict[str, Count]:
-    """Measure one tree."""
-    parsed = _syntax.modules(root, "impactcell")
+def measure(root: Path, parsed: Sequence[_syntax.Module]) -> dict[str, Count]:
+    """Measure one tree, whose product is parsed."""
     words, retired = glossary(ROOT)
     bare = [item for module in parsed for item in _syntax.bare_constants(module)[0]]
     functions = [(module, node) for module in parsed for node in _syntax.functions(module)]
@@ -200,7 +199,8 @@ def verdict(name: str, value: int, before: int) -> str:
 
 def tables() -> list[Table]:
     """Every table of this topic."""
-    now, before = measure(ROOT), json.loads(BEFORE.read_text(encoding="utf-8"))
+    parsed = _syntax.modules(ROOT, "impactcell")
+    now, before = measure(ROOT, parsed), json.loads(BEFORE.read_text(encoding="utf-8"))
     rows = [
         (
             name,
@@ -211,7 +211,7 @@ def tables() -> list[Table]:
         )
         for name, count in now.items()
     ]
-    rooms = _lines.by_room(_syntax.modules(ROOT, "impactcell"))
+    rooms = _lines.by_room(parsed)
     later = [tuple(reversed(item.split(": ", 1))) for item in now["lines of it for what it did before"].items]
     return [
         Table("Structure", ("what", "before, by hand", "before", "bar", "now"), rows, NOTE),
@@ -226,7 +226,7 @@ def main() -> int:
     parser.add_argument("tree", nargs="?", type=Path, default=ROOT, help="root of a checkout (this one)")
     parser.add_argument("--list", action="store_true", help="also print what was counted")
     chosen = parser.parse_args()
-    counts = measure(chosen.tree)
+    counts = measure(chosen.tree, _syntax.modules(chosen.tree, "impactcell"))
     if not chosen.list:
         print(json.dumps({name: count.value for name, count in counts.items()}, indent=1))
         return 0
