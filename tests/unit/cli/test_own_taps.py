@@ -40,14 +40,21 @@ def oily(model: Model) -> Model:
 
 
 @pytest.fixture
-def cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def taps() -> int:
+    """How many are looked at: fewer than a user's, for the sake of time."""
+    return 12
+
+
+@pytest.fixture
+def cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, taps: int) -> Path:
     """Cell whose journal holds more taps than are looked at, the first of them of another plant."""
     monkeypatch.setattr("impactcell.cli.accept_model.calibrated_model", lambda config: config.model)
+    monkeypatch.setattr("impactcell.cli.own_taps.TAPS", taps)
     model = read_cell(CONFIG / "cells" / "prototype.yaml").model
     write_model(model, tmp_path / "model.yaml")
     (tmp_path / "cell.yaml").write_text(CELL.format(maps=CONFIG / "maps"))
     with Journal(tmp_path / "own.sqlite", "own") as journal:
-        for cycle in range(1, TAPS + 4):
+        for cycle in range(1, taps + 4):
             draw = np.random.default_rng([cycle, 3])
             mu_s = 0.2 if cycle > 3 else 0.4
             tap = Tap(0.06, mu_s * (1.0 + 0.01 * draw.standard_normal()), stroke_m=1.5e-3)
@@ -60,14 +67,15 @@ def cell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cell.yaml"
 
 
-def test_the_last_taps_of_the_journal_are_asked(cell: Path) -> None:
+@pytest.mark.parametrize("taps", [TAPS])
+def test_the_last_taps_of_the_journal_are_asked(cell: Path, taps: int) -> None:
     config = read_cell(cell)
     own = compare_on_own_taps(config, oily(config.model))
     assert own is not None
-    assert own.taps == TAPS
+    assert own.taps == taps == 30
     assert own.gap_before == pytest.approx(1.0, abs=0.15)
     assert own.gap_after > 2.0
-    assert own.usable_before == TAPS
+    assert own.usable_before == taps
     assert own.speaks_against
     same = compare_on_own_taps(config, config.model)
     assert same is not None
@@ -80,14 +88,14 @@ def test_a_model_of_another_plant_is_put_into_service_only_if_that_is_meant(
 ) -> None:
     other, before = cell.parent / "other.yaml", read_cell(cell).model
     write_model(oily(before), other)
-    with pytest.raises(PredictionError, match=r"\(--anyway would\): of the cell's last 30 taps it leaves"):
+    with pytest.raises(PredictionError, match=r"\(--anyway would\): of the cell's last 12 taps it leaves"):
         run_verb(["model", "accept", str(cell), str(other)])
     assert read_cell(cell).model == before
     with pytest.raises(SystemExit) as ended:
         run_verb(["model", "accept", str(cell), str(other), "--anyway", "--json"])
     assert ended.value.code == 0
     told = json.loads(capsys.readouterr().out)["own_taps"]
-    assert told["taps"] == TAPS
+    assert told["taps"] == 12
     assert told["gap_after"] > 1.5 * told["gap_before"]
     assert read_cell(cell).model.name == "in oil"
 
