@@ -13,6 +13,7 @@ from impactcell.errors import DiscrepancyError
 from impactcell.physics import Ensemble, TapInput
 from impactcell.physics.effects import withdraw_effect
 from impactcell.physics.outside_effects import offer_effects
+from tests.discrepancy.study import write_blank_report
 from tests.discrepancy.test_workflow import make
 from tests.patience import PATIENCE_S
 from tests.unit.physics.test_outside_effects import OWN
@@ -30,8 +31,9 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.mark.long
 @pytest.mark.filterwarnings("default")
-def test_two_worker_processes_change_nothing(tmp_path: Path) -> None:
+def test_two_worker_processes_change_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr("impactcell.api.findings.write_reports", write_blank_report)
     campaigns.write(make("viscous_friction", shots=18), tmp_path / "campaign")
     discrepancy(tmp_path / "campaign", tmp_path / "here")
     with distributed.LocalCluster(

@@ -21,7 +21,7 @@ from impactcell.journal.stored_forms import MODEL
 from impactcell.process.progress import named_steps
 from impactcell.records import Capture, Channel
 from impactcell.settings.model_file import read_model
-from tests.discrepancy.study import strengths
+from tests.discrepancy.study import strengths, write_blank_report
 from tests.discrepancy.test_workflow import make
 from tests.snapshots import make_snapshot
 
@@ -51,7 +51,10 @@ def test_the_model_of_a_cell_is_the_nominal_one(tmp_path: Path) -> None:
     assert fitted == pytest.approx(truth, rel=0.05)
 
 
-def test_captures_of_a_journal_are_as_good_as_a_campaign(tmp_path: Path) -> None:
+def test_captures_of_a_journal_are_as_good_as_a_campaign(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("impactcell.api.findings.write_reports", write_blank_report)
     given = make("viscous_friction", shots=18)
     campaigns.write(given, tmp_path / "campaign")
     with Journal(tmp_path / "j", "press-1") as journal:
