@@ -42,13 +42,13 @@ async def shop(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Shop]:
 
 
 def write_measurement(directory: Path) -> Path:
-    """Strike 60 shots on the same plant, and write them as a logger would: one file, in German, ms and mm."""
+    """Strike 40 shots on the same plant, and write them as a logger would: one file, in German, ms and mm."""
     scenario = {
         "format": 1, "excitation": "tap", "seed": 5, "plant": {"spread": 0}, "hide": [*KNOWN, *MISSING],
-        "strengths": {**KNOWN, **MISSING}, "masses_kg": [18.9], "replicates": 6,
+        "strengths": {**KNOWN, **MISSING}, "masses_kg": [18.9], "replicates": 4,
         "sensors": {
-            "force": {"rate_hz": 10000, "noise_std": 0.4},
-            "position": {"rate_hz": 10000, "noise_std": 1.5e-6},
+            "force": {"rate_hz": 5000, "noise_std": 0.4},
+            "position": {"rate_hz": 5000, "noise_std": 1.5e-6},
         },
     }  # fmt: skip
     write(CampaignScenario.model_validate(scenario), directory / "shots")
@@ -128,7 +128,7 @@ async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Brows
     begun = time.monotonic()
     await shop.beside(drop)
     shown = await shop.beside(lambda: browser.text)
-    assert "60 shots, 18.9 kg, 2000–6000 mm/min" in shown
+    assert "40 shots, 18.9 kg, 2000–6000 mm/min" in shown
     assert "Geschwindigkeit" in shown
     assert "versuch_3.csv" in shown
     study_s = await shop.beside(run)
