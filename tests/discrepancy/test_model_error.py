@@ -152,7 +152,6 @@ def test_what_few_shots_tell_of_is_as_uncertain_as_their_noise(shots: int) -> No
     assert np.sqrt(np.mean(ratios**2)) == pytest.approx(1.0, abs=0.15)
 
 
-@pytest.mark.long
 def test_an_effect_is_established_although_something_remains(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "RATE_HZ", 2000.0)
     for later, idle in (("find_law", lambda *_: None), ("hold_against_free_forms", lambda _, found: found)):
