@@ -36,7 +36,7 @@ def notes_of_contact(found: DiscrepancyResult) -> list[str]:
 
 def test_nothing_hidden_is_no_gap_and_each_onset_is_found() -> None:
     given, onsets = logged(JOB, before=BEFORE)
-    found = name_effects(given, seed=JOB.seed, library=LIBRARY)
+    found = name_effects(given, seed=JOB.seed)  # against all that there is
     assert found.conclusion.verdict == "no_gap"
     # By the clock of the logger: of the first sample that is kept, less how long after contact it is.
     first_s = [float(shot.times[0][0]) for shot in found.problem.shots.items]
