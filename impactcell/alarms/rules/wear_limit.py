@@ -15,7 +15,7 @@ from impactcell.alarms.rule import (
     german,
     percent_sure,
 )
-from impactcell.records import Evidence, Quality, WearState
+from impactcell.records import BatchState, Evidence, Quality, WearState
 from impactcell.records.uncertainty import TOLD_STDS, plus_minus
 
 NAME = "WearLimit"
@@ -39,7 +39,7 @@ def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
     # what has been told of when it was passed stays: the rate of now says nothing of that any more
     since = context.told.change_cycle if context.active else _passed(wear, inputs.cycle, above)
     evidence = Evidence(probability, context.settings.activate_above, since, above, wear.level_std)
-    message = _message(wear, evidence, inputs.cycle, active=context.active)
+    message = _message(wear, inputs.batch, evidence, inputs.cycle, active=context.active)
     return RuleResult(NAME, holds=True, message=message, evidence=evidence)
 
 
@@ -56,6 +56,22 @@ def told_level(wear: WearState) -> tuple[str, str]:
     )
 
 
+def _renewal(wear: WearState, batch: BatchState | None) -> tuple[str, str]:
+    """Say in both languages what speaks for a surface that was renewed: friction itself is below the limit.
+
+    A fall that nobody told of is a batch to the tracker, and wear goes on from where it was.
+    """
+    friction = wear.level if batch is None else wear.level + batch.offset
+    if not friction < min(wear.level, wear.limit - TOLD_STDS * wear.level_std):
+        return "", ""
+    english = f"With the present batch friction is {friction:.4f}, below the limit: if the surface has been "
+    words = f"Mit der jetzigen Charge ist die Reibung {german(friction, '.4f')}, unter der Grenze: wurde die "
+    return (
+        english + "renewed since, reset wear only. ",
+        words + "Oberfläche inzwischen erneuert, nur den Verschleiß zurücksetzen. ",
+    )
+
+
 def _is_rising(wear: WearState) -> bool:
     return wear.rate_per_cycle > TOLD_STDS * wear.rate_std
 
@@ -66,11 +82,14 @@ def _passed(wear: WearState, cycle: int, above: float) -> int:
     return max(cycle - round(above / wear.rate_per_cycle), 0) if is_past else cycle
 
 
-def _message(wear: WearState, evidence: Evidence, cycle: int, *, active: bool) -> Message:
+def _message(
+    wear: WearState, batch: BatchState | None, evidence: Evidence, cycle: int, *, active: bool
+) -> Message:
     since, reach = evidence.change_cycle, TOLD_STDS * wear.level_std
     sure, sure_in_german = percent_sure(evidence.statistic)
     level, level_in_german = told_level(wear)
     doubt, doubt_in_german = DOUBT if wear.quality is Quality.UNCERTAIN else ("", "")
+    renewal, renewal_in_german = _renewal(wear, batch)
     if active:
         when, when_in_german = (
             f"was passed at about cycle {since} (",
@@ -84,10 +103,11 @@ def _message(wear: WearState, evidence: Evidence, cycle: int, *, active: bool) -
         when, when_in_german = "is passed (", "überschritten ("
     return Message(
         f"The surface is worn: friction is {level}, "
-        f"its limit {wear.limit:.4f} {when}{sure} % sure). {doubt}Renew the surface, then reset wear.",
+        f"its limit {wear.limit:.4f} {when}{sure} % sure). {doubt}{renewal}"
+        "Renew the surface, then reset wear.",
         f"Die Oberfläche ist verschlissen: Reibung {level_in_german}, "
         f"Grenze {german(wear.limit, '.4f')} {when_in_german}{sure_in_german} % sicher). "
-        f"{doubt_in_german}Oberfläche erneuern, danach Verschleiß zurücksetzen.",
+        f"{doubt_in_german}{renewal_in_german}Oberfläche erneuern, danach Verschleiß zurücksetzen.",
     )
 
 

@@ -9,7 +9,15 @@ import pytest
 from impactcell import alarms
 from impactcell.alarms import AlarmEvent, AlarmSettings, CycleInputs, EventKind, RuleResult, RuleSettings
 from impactcell.alarms.rules import module_connection
-from impactcell.records import Evidence, Quality, Shelving, Signature, TapPredictions, WearState
+from impactcell.records import (
+    BatchState,
+    Evidence,
+    Quality,
+    Shelving,
+    Signature,
+    TapPredictions,
+    WearState,
+)
 from impactcell.serialization import pack, unpack
 
 WEAR = "WearLimit"
@@ -122,6 +130,19 @@ def test_no_surface_is_to_be_renewed_for_uncertain_friction_alone():
         message = judge(SETTINGS, NORMAL, CycleInputs(1000, wear(0.99, quality)), WEAR).message
         assert ("itself uncertain: see its reason first. Renew" in message.english) == is_doubted
         assert ("selbst unsicher: zuerst deren Grund ansehen. Oberfläche" in message.german) == is_doubted
+
+
+@pytest.mark.parametrize(
+    ("offset", "is_told"), [(-0.02, True), (-0.0071, True), (-0.0069, False), (0.0, False), (0.01, False)]
+)
+def test_a_worn_surface_with_friction_below_the_limit_may_have_been_renewed(offset, is_told):
+    """The level is 0.21 ± 0.002 (95 %), the limit 0.205: friction below 0.203 is surely below it."""
+    batch = BatchState("", offset, 0.001, offset, 0.001, 900, Quality.GOOD)
+    message = judge(SETTINGS, NORMAL, CycleInputs(1000, wear(0.99), batch), WEAR).message
+    assert (
+        f"friction is {0.21 + offset:.4f}, below the limit: if the surface has" in message.english
+    ) == is_told
+    assert ("inzwischen erneuert, nur den Verschleiß zurücksetzen" in message.german) == is_told
 
 
 def test_an_unknown_wear_leaves_the_alarm_alone():
