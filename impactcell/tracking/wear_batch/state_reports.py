@@ -87,7 +87,7 @@ def tracking_result(
             offset = total - moments.level
             if math.isfinite(settings.wear_limit):
                 probability = wear_blocks.probability_above(blocks, index, settings.wear_limit)
-    walks = (state.level_variance, state.slope_variance)
+    walks = _walks_ahead(state, moments)
     doubts = [*notes, *([observation.doubt] if observation.doubt else [])]
     wear = wear_report.forecast(
         moments,
@@ -132,6 +132,13 @@ def _at_horizon(settings: TrackerSettings, state: TrackerState, moments: WearMom
     prior = _slope_prior(settings, state)
     horizon = min(settings.horizon_cycles, float(state.clock.last - state.first_index))
     return horizon, wear_report.probability_after(ahead, horizon, prior)
+
+
+def _walks_ahead(state: TrackerState, moments: WearMoments) -> tuple[float, float]:
+    """Process variances of level and slope a cycle, as far as wear has been followed at its present rate."""
+    begun = state.first_index if state.rate_change is None else state.rate_change.cycle
+    walks = state.level_variance, state.slope_variance
+    return wear_report.walks_ahead(moments, walks, float(state.clock.last - begun))
 
 
 def _slope_prior(settings: TrackerSettings, state: TrackerState) -> float:

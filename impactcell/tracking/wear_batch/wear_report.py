@@ -20,6 +20,11 @@ BISECTION = 1e-10
 """Relative width at which a crossing is found."""
 
 
+RATE_DOUBT = 0.25
+"""Standard deviation by which wear may change its rate over as many cycles as it has been followed, in its
+rate. Surfaces run in, and wear out; without it the intervals are those of wear that is steady for ever."""
+
+
 class WearMoments(NamedTuple):
     """Level of mu_s at the reference batch and its slope a cycle: means, variances and covariance."""
 
@@ -53,6 +58,17 @@ def extrapolation(moments: WearMoments, walks: tuple[float, float], limit: float
         float(walks[0]),
         float(walks[1]),
     )
+
+
+def walks_ahead(moments: WearMoments, walks: tuple[float, float], followed: float) -> tuple[float, float]:
+    """Process variances of level and slope a cycle from now on: those seen, and that a rate may change.
+
+    Parameters
+    ----------
+    followed : float
+        Cycles for which wear has been followed.
+    """
+    return walks[0], walks[1] + (RATE_DOUBT * moments.slope) ** 2 / max(followed, 1.0)
 
 
 @compiled

@@ -226,6 +226,18 @@ def test_a_known_batch_that_comes_back_is_recognised():
     assert (last.batch.batch_id, last.batch.offset, last.batch.offset_std) == ("A", 0.0, 0.0)
 
 
+def test_the_interval_of_cycles_left_is_not_that_of_wear_that_is_steady_for_ever():
+    """Wear that slows down by half over the next thousand cycles, as it was seen for a thousand."""
+    readings = series(1000, seed=3, slope=2e-5)
+    wear = run(replace(UNKNOWN, wear_limit=0.236), readings)[-1].wear
+    # 800 cycles at the rate seen; level after h cycles, the rate falling by 1e-8 a cycle: 2e-5 h - 5e-9 h^2
+    excess = 0.236 - (0.2 + 2e-5 * 999)
+    slowed = (2e-5 - math.sqrt(4e-10 - 2e-8 * excess)) / 1e-8
+    hastened = (-2e-5 + math.sqrt(4e-10 + 2e-8 * excess)) / 1e-8
+    assert wear.cycles_to_limit_low < hastened < wear.cycles_to_limit < slowed < wear.cycles_to_limit_high
+    assert wear.cycles_to_limit_high < 2.0 * slowed
+
+
 @pytest.mark.parametrize("name", ["A", "B"], ids=["in the first batch", "in a later one"])
 def test_a_change_within_a_known_batch_is_found_and_is_no_wear(name):
     readings = [replace(r, batch_id="A" if r.cycle < 200 else name) for r in series(700, slope=2e-6)]

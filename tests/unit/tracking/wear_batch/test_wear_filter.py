@@ -99,6 +99,22 @@ def test_cycles_to_limit_and_its_interval():
     assert published.probability_above_limit == pytest.approx(norm.sf(100.0))
 
 
+def test_a_rate_may_change_over_as_many_cycles_as_it_was_followed():
+    """By a quarter of itself: a walk of the slope; its integral has a third of its variance by the cube."""
+    moments, followed = WearMoments(0.2, 1e-5, 1e-8, 0.0, 1e-16), 1600.0
+    walks = wear_report.walks_ahead(moments, (2e-12, 3e-18), followed)
+    assert math.sqrt((walks[1] - 3e-18) * followed) == pytest.approx(0.25 * moments.slope)
+    published = wear_report.forecast(moments, walks, 0.202)
+    assert published.cycles_to_limit == pytest.approx(200.0)
+    for cycles, share in (
+        (published.cycles_to_limit_low, 0.025),
+        (published.cycles_to_limit_high, 0.975),
+    ):
+        variance = 1e-8 + cycles**2 * 1e-16 + 2e-12 * cycles
+        variance += ((0.25e-5) ** 2 / followed + 3e-18) * cycles**3 / 3.0
+        assert norm.sf(0.202, 0.2 + 1e-5 * cycles, math.sqrt(variance)) == pytest.approx(share, rel=1e-6)
+
+
 def test_a_limit_that_is_not_reached():
     falling = wear_report.forecast(WearMoments(0.2, -1e-5, 1e-8, 0.0, 1e-16), (0.0, 0.0), 0.21)
     assert falling.cycles_to_limit == math.inf
