@@ -75,11 +75,7 @@ def compare_with_previous_batch(
     previous = state.previous_batch
     if previous is None or previous not in current.batches:
         return state, None
-    size, std = wear_filter.contrast(current, current.current, previous)
-    prior = settings.step_std * math.sqrt(cycle.variance)
-    statistic = 0.5 * (size / std) ** 2 + math.log(std / prior)
-    length = max(1.0, (state.batch_start - state.first_index) / max(state.batch_count - 1, 1))
-    threshold = math.log(max(WAYS_KNOWN * settings.false_alarm_cycles / length, SMALLEST_ODDS))
+    size, std, statistic, threshold = _contrast_test(settings, state, current, cycle)
     change = ChangePoint(state.batch_start, size, std, cycle.timing.index, statistic, threshold)
     if state.tested:
         is_reported = state.change_point is not None and state.change_point.cycle == state.batch_start
@@ -87,6 +83,20 @@ def compare_with_previous_batch(
     if statistic <= threshold or not _scale_is_known(state, cycle.noise):
         return state, None
     return replace(state, change_point=change, tested=True), change
+
+
+def differed_before(
+    settings: TrackerSettings, state: TrackerState, current: wear_filter.WearFilter, cycle: UsableCycle
+) -> bool:
+    """Whether a batch that has come back was certain to differ from the one before already when it went.
+
+    Where two parts take turns, that they differ is told once. `current` has the batch as the present one, and
+    nothing of it since it came back.
+    """
+    if state.previous_batch not in current.batches or not _scale_is_known(state, cycle.noise):
+        return False
+    *_, statistic, threshold = _contrast_test(settings, state, current, cycle)
+    return statistic > threshold
 
 
 def reason_not_ready(state: TrackerState) -> str:
@@ -99,6 +109,18 @@ def reason_not_ready(state: TrackerState) -> str:
 def is_certain(state: TrackerState, noise: NoiseScale, statistic: float, threshold: float) -> bool:
     """Whether a log statistic is beyond its threshold however well the scale of the noise is known."""
     return _student_statistic(statistic, noise) > threshold and _scale_is_known(state, noise)
+
+
+def _contrast_test(
+    settings: TrackerSettings, state: TrackerState, current: wear_filter.WearFilter, cycle: UsableCycle
+) -> tuple[float, float, float, float]:
+    """Give size and standard deviation of the shift between two batches, and its statistic and threshold."""
+    size, std = wear_filter.contrast(current, current.current, state.previous_batch)
+    prior = settings.step_std * math.sqrt(cycle.variance)
+    statistic = 0.5 * (size / std) ** 2 + math.log(std / prior)
+    length = max(1.0, (state.batch_start - state.first_index) / max(state.batch_count - 1, 1))
+    threshold = math.log(max(WAYS_KNOWN * settings.false_alarm_cycles / length, SMALLEST_ODDS))
+    return size, std, statistic, threshold
 
 
 def _student_statistic(statistic: float, noise: NoiseScale) -> float:

@@ -5,7 +5,6 @@ passes for a random walk. A random walk is adopted only where it is clearly more
 adopted by mistake costs a wear rate most of its precision.
 """
 
-import math
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
@@ -37,6 +36,10 @@ SLOPE_WALKS = (0.0, 1e-5, 1e-4, 1e-3)
 CLEARLY = 5.0
 """Nats by which a random walk must be more likely than none: a Bayes factor of 150 (Kass & Raftery 1995); of
 correlated scatter so many for each of the cycles that count as one."""
+
+EARLIEST_CHANGE = 3
+"""Cycles before which no unannounced batch change is believed: an odd first value is no batch. So long the
+filter of known batches is what the bank says, which knows that the first value may be an outlier."""
 
 INDEX, VALUE, STD, BATCH_CHANGE, BATCH = range(5)
 """Columns of a `CommissioningRecord`."""
@@ -180,10 +183,12 @@ def replay_filter(
     variances = noise_scale.variances(noise, rows[:, STD])
     unit = float(np.median(variances))
     names = [record.batches[int(place)] for place in rows[:, BATCH]]
-    state = wear_filter.initial_state(
-        rows[0, VALUE], variances[0], settings.slope_std * math.sqrt(variances[0]), names[0]
-    )
-    for before, row, variance, name in zip(rows[:-1], rows[1:], variances[1:], names[1:], strict=True):
+    is_first = (rows[:, INDEX] < rows[0, INDEX] + EARLIEST_CHANGE) & (rows[:, BATCH] == rows[0, BATCH])
+    begun = len(rows) if is_first.all() else int(np.argmin(is_first))
+    first = replay_bank(settings, replace(record, rows=rows[:begun]), noise, walks, int(rows[0, INDEX]))
+    state = wear_filter.from_bank(*run_length_bank.moments(first.bank), names[0])
+    followed = zip(rows[begun - 1 :], rows[begun:], variances[begun:], names[begun:], strict=False)
+    for before, row, variance, name in followed:
         passed = int(row[INDEX] - before[INDEX])
         state = wear_filter.predict(state, passed, walks.level**2 * unit, walks.slope**2 * unit)
         if name != state.current:

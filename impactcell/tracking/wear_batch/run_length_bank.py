@@ -23,7 +23,6 @@ from impactcell.records import Samples
 from impactcell.tracking.wear_batch import run_length_update
 from impactcell.tracking.wear_batch.run_length_model import (
     HYPOTHESIS,
-    OUTLIER_SCALE,
     SLOPE,
     STEPS,
     Bank,
@@ -50,6 +49,9 @@ MEMORY = 5000.0
 """Cycles after which outliers are forgotten."""
 MOST_OUTLIERS = 0.1
 """Where there seem to be more than this share, they are no outliers."""
+FIRST_OUTLIER_SCALE = 100.0
+"""Standard deviation of the friction about a first measurement that is an outlier, in those of a good one.
+Nothing else tells of it yet: by that of other outliers one farther off would be a batch of its own."""
 
 
 class BankResult(NamedTuple):
@@ -179,7 +181,7 @@ def initial_bank(value: float, variance: float, slope_std: float, cycle: int, ou
     bank = np.zeros(2, HYPOTHESIS)
     bank["log_weight"] = math.log(1.0 - outliers), math.log(outliers)
     bank["change_cycle"], bank["mean"][:, 0] = cycle, value
-    bank["covariance"][:, 0, 0] = variance, variance * OUTLIER_SCALE**2
+    bank["covariance"][:, 0, 0] = variance, variance * FIRST_OUTLIER_SCALE**2
     bank["covariance"][:, SLOPE, SLOPE] = slope_std**2
     return stored(bank, 2)
 

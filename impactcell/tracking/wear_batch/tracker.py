@@ -31,8 +31,6 @@ from impactcell.tracking.wear_batch.state import (
 from impactcell.tracking.wear_batch.state_reports import CycleOutcome, empty_result, tracking_result
 from impactcell.tracking.wear_batch.wear_filter import WearFilter
 
-EARLIEST_CHANGE = 3
-"""Cycles before which no unannounced batch change is believed: an odd first value is no batch."""
 SHORTEST_BATCH = 4.0
 """Mean cycles a batch id must last to say anything about batches."""
 JUDGED_BATCHES = 10
@@ -186,7 +184,7 @@ def _follow_batch_id(
         return state, UNSAID
     is_expected = observation.expected_change
     if batch_id is None or batch_id == state.batch_id:
-        otherwise = RULED_OUT if index < state.first_index + EARLIEST_CHANGE else UNSAID
+        otherwise = RULED_OUT if index < state.first_index + noise_identification.EARLIEST_CHANGE else UNSAID
         return state, ANNOUNCED if is_expected else otherwise
     state = replace(
         state,
@@ -218,6 +216,9 @@ def _update_filter(
         has_changed = change is not None
     is_bent = state.rate_change is not None and state.rate_change.detected_at == timing.index
     if is_known and current is not None and not (has_changed or is_bent or is_in_bank_only):
+        if _is_one_of_first(state, cycle, current):
+            first = wear_filter.from_bank(*run_length_bank.moments(updated.bank), current.current)
+            return state, first, change, batch_filter.innovation(state, cycle)
         return _update_known_batch(settings, state, cycle, current)
     innovation = batch_filter.innovation(state, cycle)
     if settings.batch is BatchKnowledge.UNKNOWN:
@@ -237,6 +238,12 @@ def _update_filter(
     return state, current, change, innovation
 
 
+def _is_one_of_first(state: TrackerState, cycle: UsableCycle, current: WearFilter) -> bool:
+    """Whether the filter is still what the bank says: all cycles yet are of one batch, and few."""
+    is_young = cycle.timing.index < state.first_index + noise_identification.EARLIEST_CHANGE
+    return is_young and current.batches == (cycle.observation.batch_id,)
+
+
 def _is_announced_under_same_id(cycle: UsableCycle, current: WearFilter | None) -> bool:
     observation = cycle.observation
     is_same_id = current is not None and observation.batch_id == current.current
@@ -251,7 +258,10 @@ def _update_known_batch(
     if lag == 0:
         current = _pass_time(state, current, cycle)
         if batch_id is not None and batch_id != current.current:
+            has_been_seen = batch_id in current.batches
             current = wear_filter.switch_batch(current, batch_id, settings.step_std**2 * variance)
+            if has_been_seen and batch_change_detection.differed_before(settings, state, current, cycle):
+                state = replace(state, tested=True)
     current, error = wear_filter.update(
         current, cycle.observation.mu_s, variance, settings.outlier_threshold, lag, batch_id
     )

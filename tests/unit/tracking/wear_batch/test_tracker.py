@@ -226,6 +226,37 @@ def test_a_known_batch_that_comes_back_is_recognised():
     assert (last.batch.batch_id, last.batch.offset, last.batch.offset_std) == ("A", 0.0, 0.0)
 
 
+@pytest.mark.parametrize("run_length", [1, 25])
+def test_two_parts_in_turn_are_told_to_differ_once_and_a_third_is_told_too(run_length):
+    names = ["AB"[(i // run_length) % 2] if i < 500 else "C" for i in range(550)]
+    offsets = {"A": 0.0, "B": 3.0 * STD, "C": -5.0 * STD}
+    readings = [
+        replace(r, batch_id=name, mu_s=r.mu_s + offsets[name])
+        for r, name in zip(series(550, seed=5), names, strict=True)
+    ]
+    outcomes = run(KNOWN, readings)
+    found = [r.cycle for r, o in zip(readings, outcomes, strict=True) if o.shift]
+    in_turn = [cycle for cycle in found if cycle < 500]
+    # a pair that was nearly certain when it went may be told from either side
+    assert 1 <= len(in_turn) <= 2
+    assert in_turn[-1] < 100
+    assert [500 <= cycle < 510 for cycle in found[len(in_turn) :]] == [True]
+    last = outcomes[499]
+    assert abs(last.batch.offset - offsets[names[499]]) < 4.0 * max(last.batch.offset_std, 1e-12)
+
+
+@pytest.mark.parametrize("off", [6.0, 60.0, 150.0, -80.0])
+@pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
+def test_a_first_estimate_however_far_off_is_neither_batch_nor_wear(config, off):
+    readings = series(200, seed=9, batch="A")
+    readings[0] = replace(readings[0], mu_s=readings[0].mu_s + off * STD)
+    outcomes = run(config, readings)
+    assert not any(o.shift for o in outcomes)
+    assert max(o.wear.probability_above_limit for o in outcomes[20:]) < 0.5
+    last = outcomes[-1].wear
+    assert abs(last.level - 0.2) < 4.0 * last.level_std < 4e-3
+
+
 def test_the_interval_of_cycles_left_is_not_that_of_wear_that_is_steady_for_ever():
     """Wear that slows down by half over the next thousand cycles, as it was seen for a thousand."""
     readings = series(1000, seed=3, slope=2e-5)
