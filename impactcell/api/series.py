@@ -19,7 +19,7 @@ def track(
     mu_s_std: ArrayLike | None = None,
     *,
     batch: Sequence[object] | None = None,
-    limit: float = math.inf,
+    limit: float | None = None,
 ) -> TrackedSeries:
     """Track wear and batch over a series of friction estimates, and raise what alarms there are.
 
@@ -34,8 +34,8 @@ def track(
     batch : sequence of str or None, optional
         Batch of each cycle, where it is known (None, nan or empty where not); without it changes of batch
         are found in the series.
-    limit : float
-        mu_s at which the surface is worn.
+    limit : float, optional
+        mu_s at which the surface is worn; without it there is no alarm of wear.
 
     Returns
     -------
@@ -67,19 +67,20 @@ def track(
     for place, number in enumerate(cycles):
         if fault := whole_number_fault(number):
             raise SeriesError(f"cycle[{place}] = {number:g} {fault}")
-    if not limit > 0.0:
-        raise SeriesError(f"limit = {limit:g}: give the mu_s at which the surface is worn, or leave it out")
-    if LARGEST_FRICTION < limit < math.inf:
+    worn = math.inf if limit is None else float(_numbers("limit", limit).item(0))
+    if not worn > 0.0:
+        raise SeriesError(f"limit = {worn:g}: give the mu_s at which the surface is worn, or leave it out")
+    if LARGEST_FRICTION < worn < math.inf:
         raise SeriesError(
-            f"limit = {limit:g}: no surface reaches it, for a mu_s above {LARGEST_FRICTION:g} is not used; "
-            f"give the mu_s at which it is worn, {0.01 * limit:g} if that was meant in %"
+            f"limit = {worn:g}: no surface reaches it, for a mu_s above {LARGEST_FRICTION:g} is not used; "
+            f"give the mu_s at which it is worn, {0.01 * worn:g} if that was meant in %"
         )
     observations = [
         FrictionObservation(int(at), float(value), float(std), batch_id=batch_id)
         for at, value, std, batch_id in zip(cycles, values, stds, batches, strict=True)
     ]
     knowledge = BatchKnowledge.UNKNOWN if batch is None else BatchKnowledge.KNOWN
-    return replay(TrackerSettings(wear_limit=limit, batch=knowledge), observations)
+    return replay(TrackerSettings(wear_limit=worn, batch=knowledge), observations)
 
 
 def _numbers(name: str, given: ArrayLike) -> Samples:

@@ -72,6 +72,12 @@ def test_a_limit_that_is_no_friction_is_refused(limit: float) -> None:
         impactcell.track([1, 2], [0.2, 0.2], limit=limit)
 
 
+def test_no_limit_is_none_and_words_are_no_limit() -> None:
+    assert impactcell.track([1, 2], [0.2, 0.2], 0.002, limit=None).alarms == ()
+    with pytest.raises(SeriesError, match="limit is to hold numbers"):
+        impactcell.track([1, 2], [0.2, 0.2], limit="worn")  # type: ignore[arg-type]
+
+
 def test_one_standard_deviation_stands_for_all() -> None:
     one = impactcell.track(np.arange(100), series(count=100), 0.002)
     each = impactcell.track(np.arange(100), series(count=100), np.full(100, 0.002))
