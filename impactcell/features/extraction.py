@@ -13,6 +13,8 @@ from impactcell.features.channels import (
     path_along_tap,
 )
 from impactcell.features.contact import loss_of_contact, peak_force
+from impactcell.features.force_zero import with_zero
+from impactcell.features.lost_samples import without_lost_samples
 from impactcell.features.measured import MeasuredFeature
 from impactcell.features.noise import noise_std
 from impactcell.features.segment import SlideSegment, extract_segment
@@ -34,7 +36,7 @@ class Features:
     Attributes
     ----------
     capture : Capture
-        From which they are, without its spikes.
+        From which they are, without its spikes and what was lost.
     force : CheckedForce or Fault
     position : CheckedChannel or Fault
         Displacement from where the part lay, m, positive along +1. Both channels carry their noise.
@@ -48,7 +50,7 @@ class Features:
         Block means of the position from separation, or from the start of a record without force, to just
         before rest.
     left_out : tuple of str
-        What of the capture is in none of them.
+        What of the capture is in none of them, an offset of the force too.
     """
 
     capture: Capture
@@ -70,8 +72,11 @@ def extract(capture: Capture) -> Features:
     >>> features.slide
     CaptureError('no position was recorded')
     """
-    capture, left_out = without_spikes(capture)
-    force = _attempt(check_force, capture.force)
+    capture, lost = without_lost_samples(capture)
+    capture, spikes = without_spikes(capture)
+    force, offset = _attempt(check_force, capture.force), ""
+    if isinstance(force, CheckedForce):
+        force, offset = with_zero(force)
     position = _attempt(displacement, capture)
     path = position if isinstance(position, Fault) else _attempt(path_along_tap, position, capture.direction)
     peak = force if isinstance(force, Fault) else _attempt(peak_force, force)
@@ -91,7 +96,7 @@ def extract(capture: Capture) -> Features:
         separation,
         slide,
         _segment(capture, position, separation),
-        left_out,
+        lost + spikes + ((offset,) if offset else ()),
     )
 
 

@@ -70,16 +70,18 @@ def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
     spans = [(time - KINK_SPAN_S, time + KINK_SPAN_S) for time in kinks]
     halt_s = features.capture.halt_s
     edges = [halt_s] if math.isfinite(halt_s) else []
-    pressed = _surely_touching(required(features.force).after_contact(), onset_std_s)
+    whole_force, whole_position = required(features.force), required(features.position)
+    pressed = _surely_touching(whole_force.after_contact(), onset_std_s)
     force = average_blocks(pressed, FORCE_BLOCK_S, FINE_FORCE_BLOCK_S, spans, edges)
     jumps = [event.time_s for event in motion.events if event.kind is TapEventKind.CONTACT]
     if jumps or edges:
         factors = _std_factors_at_jumps(force.time_s, jumps, JUMP_SPAN_S)
         factors *= _std_factors_at_jumps(force.time_s, edges, AT_THE_HALT_S)
         force = replace(force, std=force.std * factors)
-    moved = _surely_touching(required(features.position), onset_std_s)
+    moved = _surely_touching(whole_position, onset_std_s)
     position = average_blocks(moved, POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
-    return LinearisedModel(plant, tap, force, position, recorder_std)
+    zero_std = whole_force.zero_std, whole_position.zero_std
+    return LinearisedModel(plant, tap, force, position, recorder_std, zero_std)
 
 
 def until_next_contact(response: LinearisedModel, features: Features) -> LinearisedModel:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from impactcell.errors import NotConvergedError, PredictionError
-from impactcell.features import Fault, Features, MeasuredFeature, SlideFeatures, extract
+from impactcell.features import Fault, Features, MeasuredFeature, SlideFeatures, extract, impulse_balance
 from impactcell.prediction.equations import beyond_calibration, by_distance, by_force, combined, out_of_range
 from impactcell.prediction.linearised_model import FORCE_SCALE, MASS, PARAMETERS, VELOCITY
 from impactcell.prediction.mass_interpolation import interpolate_mass
@@ -43,7 +43,8 @@ def estimate_from_features(features: Features, model: Model, misfit: float = 1.0
 
     Published is the waveform's estimate where it converges, else (6), else (4) or (5) alone where only one
     channel was recorded.
-    A capture that cannot be used gives a bad estimate that says why; nothing is raised for it.
+    A capture that cannot be used, or contradicts itself, gives a bad estimate that says why; nothing is
+    raised for it.
 
     Parameters
     ----------
@@ -78,6 +79,8 @@ def estimate_from_features(features: Features, model: Model, misfit: float = 1.0
             else:
                 missed = f"the model misses these taps: residuals are {misfit:.3g} times the noise"
                 mu_s, mu_k = _with_warnings(mu_s, missed), _with_warnings(mu_k, missed)
+    if estimator is not Estimator.WAVEFORM and (cannot_be := impulse_balance.doubts(features)):
+        mu_s, mu_k, estimator = _refused(mu_s, cannot_be), _refused(mu_k, cannot_be), Estimator.NONE
     return FrictionEstimate(
         mu_s=_with_notes(mu_s, features.left_out),
         mu_k=_with_notes(mu_k, features.left_out),
@@ -212,6 +215,11 @@ def _with_notes(coefficient: Coefficient, notes: Sequence[str]) -> Coefficient:
     """Add what is to be said of a coefficient and makes it no worse."""
     said = filter(None, (*coefficient.reason.split("; "), *"; ".join(notes).split("; ")))
     return replace(coefficient, reason="; ".join(dict.fromkeys(said))) if notes else coefficient
+
+
+def _refused(coefficient: Coefficient, why: Sequence[str]) -> Coefficient:
+    """Publish none where force, position, mass and time of a tap contradict each other."""
+    return _with_notes(Coefficient(reason="; ".join(why)), [coefficient.reason])
 
 
 def _select_published(capture: Capture, equations: _Equations) -> tuple[Coefficient, Estimator]:

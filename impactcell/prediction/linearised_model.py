@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.errors import PhysicsError
-from impactcell.numerics.jit import compiled
 from impactcell.physics import Ensemble, Plant, TapInput
 from impactcell.prediction.block_averaging import BlockMeans
+from impactcell.prediction.block_residuals import linearise_blocks, sample_squares
 from impactcell.records import Samples
 
 MU_K, RATIO, STIFFNESS, DAMPING, ONSET, MASS, VELOCITY, FORCE_SCALE = range(8)
@@ -94,6 +94,8 @@ class LinearisedModel:
     force, position : BlockMeans
     recorder_std : RecorderStd
         If one of these is above 0, what they are of is fitted.
+    zero_std : tuple of float
+        Standard deviations of the zeros of force [N] and position [m], where they were taken from the record.
 
     Attributes
     ----------
@@ -110,6 +112,7 @@ class LinearisedModel:
         force: BlockMeans,
         position: BlockMeans,
         recorder_std: RecorderStd = (0.0, 0.0, 0.0, 0.0),
+        zero_std: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self.tap = tap
         self.recorder_std = np.array(recorder_std)
@@ -131,6 +134,9 @@ class LinearisedModel:
             gravity_m_s2=plant.gravity_m_s2,
         )
         self._scatters = force.scatter, position.scatter
+        is_force = np.arange(self.size) < len(force.values)
+        zeros = np.array([is_force * zero_std[0], ~is_force * zero_std[1]])
+        self._disturbances = zeros[np.array(zero_std) > 0.0]
         self._table = np.tile(self._ensemble.parameters(plant), (copies, 1))
 
     def reweighted(self, factor: Samples) -> "LinearisedModel":
@@ -139,13 +145,18 @@ class LinearisedModel:
         other._weights = self._weights / factor  # noqa: SLF001  # its own copy
         return other
 
+    def modelled(self, residual: Samples) -> tuple[Samples, Samples]:
+        """Give the blocks of force [N] and position [m] that leave a residual."""
+        model = self._values - residual / self._weights
+        return model[: len(self.force_time_s)], model[len(self.force_time_s) :]
+
     def gap(self, residual: Samples) -> float:
         """RMS of the residuals of single samples over the noise of their sensor, from those of the blocks.
 
         Within a block the model is taken as straight, which it is to a hundredth of the noise; blocks about a
         jump, whose means say nothing, are left out.
         """
-        model = self._values - residual / self._weights
+        model = np.concatenate(self.modelled(residual))
         split = len(self.force_time_s)
         total = count = 0.0
         for times, scatter, part in (
@@ -154,7 +165,7 @@ class LinearisedModel:
         ):
             if len(times) > 2:
                 sums = scatter.count, scatter.times, scatter.values, scatter.both, scatter.noise_std
-                squares, counted = _sample_squares(
+                squares, counted = sample_squares(
                     times, model[part], residual[part], self._weights[part], sums
                 )
                 total += squares
@@ -208,7 +219,10 @@ class LinearisedModel:
         steps, force, position = STEPS_OUT[:count], traces.force_n, traces.position_m
         if count > PARAMETERS:
             force, position = self._with_force_scale(force, position, theta[FORCE_SCALE])
-        fields = _linearise(force, position, self._values, self._weights, steps, beyond)
+        disturbances = self._disturbances * self._weights
+        fields = linearise_blocks(
+            force, position, self._values, self._weights, steps, (RATIO, beyond), disturbances
+        )
         if not math.isfinite(fields[3]):
             raise PhysicsError("the motion is not finite with these parameters")
         return Linearisation(*fields)
@@ -219,73 +233,3 @@ class LinearisedModel:
         force = math.exp(std * in_stds) * force
         stepped = math.exp(std * RECORDER_STEP) * force[: len(self.force_time_s)]
         return np.append(force, stepped), np.append(position, position[: len(self.position_time_s)])
-
-
-@compiled
-def _linearise(
-    force: Samples, position: Samples, values: Samples, weights: Samples, steps: Samples, beyond: float
-) -> tuple[Samples, Samples, Samples, float]:
-    """Fields of `Linearisation` from blocks of the model at theta and, one after the other, beside it.
-
-    Parameters
-    ----------
-    force, position : ndarray, shape ((p + 1) force blocks,), ((p + 1) position blocks,)
-    values, weights : ndarray, shape (n,)
-    steps : ndarray, shape (p,)
-        Which way, and how far, each parameter was moved.
-    beyond : float
-        How far to continue along ln(mu_k/mu_s).
-    """
-    count, size = len(steps), len(values)
-    split = len(force) // (count + 1)
-    residual, derivative = np.empty(size), np.empty(count)
-    normal, slope = np.zeros((count, count)), np.zeros(count)
-    chi2 = 0.0
-    for i in range(size):
-        model, row, blocks = (force, i, split) if i < split else (position, i - split, size - split)
-        modelled = model[row]
-        for k in range(count):
-            derivative[k] = (modelled - model[(k + 1) * blocks + row]) * weights[i] / steps[k]
-        scaled = (values[i] - modelled) * weights[i] + derivative[RATIO] * beyond
-        residual[i] = scaled
-        chi2 += scaled * scaled
-        for k in range(count):
-            slope[k] += derivative[k] * scaled
-            for m in range(k + 1):
-                normal[k, m] += derivative[k] * derivative[m]
-    for k in range(count):
-        for m in range(k):
-            normal[m, k] = normal[k, m]
-    return residual, normal, slope, chi2
-
-
-@compiled
-def _sample_squares(
-    times: Samples,
-    model: Samples,
-    residual: Samples,
-    weights: Samples,
-    sums: tuple[Samples, Samples, Samples, Samples, float],
-) -> tuple[float, float]:
-    """Sum of squares of single samples over their noise, and their number, blocks about a jump left out.
-
-    The model's slope in a block comes from its neighbours, limited to twice the smaller one-sided slope,
-    and 0 where these differ in sign: beside a jump it is that of this side. `weights` are one over the std of
-    each block; those about a jump are known by their widened std. `sums` are the fields of `WithinBlockSums`.
-    """
-    count, tt, yy, ty, noise_std = sums
-    last = len(model) - 1
-    total, counted = 0.0, 0.0
-    for i in range(last + 1):
-        if not weights[i] * noise_std > 0.5 * math.sqrt(count[i]):  # its std is not noise_std / sqrt(count)
-            continue
-        before, after = max(i - 1, 0), min(i + 1, last)
-        slope_before = (model[before + 1] - model[before]) / (times[before + 1] - times[before])
-        slope_after = (model[after] - model[after - 1]) / (times[after] - times[after - 1])
-        central = (model[after] - model[before]) / (times[after] - times[before])
-        steepest = 2.0 * min(abs(slope_before), abs(slope_after))
-        slope = min(max(central, -steepest), steepest) if slope_before * slope_after > 0.0 else 0.0
-        within = yy[i] - 2.0 * slope * ty[i] + slope * slope * tt[i]
-        total += residual[i] * residual[i] + within / noise_std**2
-        counted += count[i]
-    return total, counted

@@ -19,6 +19,21 @@ TAP_REASONS: Final[Mapping[str, str]] = {
     r"(\d+) outliers? of the force left out": r"\1 Ausreißer der Kraft weggelassen",
     r"(\d+) outliers? of the position left out": r"\1 Ausreißer des Wegs weggelassen",
     r"(\d+) outliers? of the actuator left out": r"\1 Ausreißer des Aktorwegs weggelassen",
+    r"(\d+) lost samples? of the (force|position) left out: check its cable and link":
+        r"\1 verlorene Werte von \2 weggelassen: Kabel und Verbindung prüfen",
+    r"force stands at (\S+) N without contact, taken off: tare its sensor":
+        r"die Kraft steht ohne Kontakt bei \1 N, abgezogen: den Sensor nullen",
+    r"force pulls with (\S+) N, where a contact only pushes: turn its sign in the module or at its amplifier":
+        r"die Kraft zieht mit \1 N, wo ein Kontakt nur drückt: ihr Vorzeichen im Modul oder am Verstärker "
+        r"umdrehen",
+    r"the part moved (\S+) mm against the tap's direction (\S+): turn the sign of position in the module, "
+    r"or put direction right":
+        r"das Teil bewegte sich \1 mm gegen die Richtung des Stoßes, \2: das Vorzeichen des Wegs im Modul "
+        r"umdrehen oder die Richtung richtigstellen",
+    r"force gave the part (\S+) N s, its motion shows (\S+) N s: see unit and scale of force, position and "
+    r"mass, and the sampling rates":
+        r"die Kraft gab dem Teil \1 N s, seine Bewegung zeigt \2 N s: Einheit und Maßstab von Kraft, Weg und "
+        r"Masse und die Abtastraten prüfen",
     r"from the mean deceleration of the slide": "aus der mittleren Verzögerung des Gleitens",
     r"through mu_k/mu_s of the model": "über µk/µs des Modells",
     r"by sliding distance only: (.+)": r"nur aus dem Gleitweg: \1",

@@ -1,0 +1,122 @@
+"""Taps whose record is disturbed, not their physics. Truth: the simulator's own plant."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from impactcell.features import extract
+from impactcell.physics import Plant
+from impactcell.prediction import Model, Prior, estimate
+from impactcell.records import Capture, Channel, Estimator, FrictionEstimate, Quality
+from impactcell.web.texts.reasons import german_reason
+from tests.taps import VISCOUS, Tap
+
+PLANT = Plant(6.5e5, 465.0, 0.2, 0.152, effects=VISCOUS)
+MODEL = Model("reference", PLANT, Prior(6500.0, 9.3, 0.0228))
+TAP = Tap(0.05)
+GOOD = TAP.capture(np.random.default_rng(1), force_hz=1e5)
+CLEAN = estimate(GOOD, MODEL)
+
+
+def channel(capture: Capture, which: str) -> Channel:
+    found: Channel | None = getattr(capture, which)
+    assert found is not None
+    return found
+
+
+def assert_as_meant(found: FrictionEstimate, told: str) -> None:
+    assert found.estimator is Estimator.WAVEFORM
+    assert found.mu_s.quality is Quality.GOOD, found.mu_s.reason
+    assert told in found.mu_s.reason
+    assert found.mu_s.value == pytest.approx(TAP.mu_s, abs=3.3 * found.mu_s.std)
+    assert found.mu_k.value == pytest.approx(TAP.mu_k, abs=3.3 * found.mu_k.std)
+    assert found.mu_s.std < 2.0 * CLEAN.mu_s.std
+    for part in filter(None, found.mu_s.reason.split("; ")):
+        assert german_reason(part) != part
+
+
+def test_a_right_tap_has_nothing_to_be_told() -> None:
+    assert_as_meant(CLEAN, "")
+    assert CLEAN.mu_s.reason == ""
+
+
+@pytest.mark.parametrize("how", ["held", "zero", "nan"])
+@pytest.mark.parametrize(("which", "first", "count"), [("force", 700, 60), ("position", 400, 15)])
+def test_lost_samples_are_left_out_and_told(which: str, first: int, count: int, how: str) -> None:
+    values = channel(GOOD, which).values.copy()
+    values[first : first + count] = {"held": values[first], "zero": 0.0, "nan": math.nan}[how]
+    spoilt = replace(GOOD, **{which: replace(channel(GOOD, which), values=values)})
+    assert_as_meant(estimate(spoilt, MODEL), f"{count} lost samples of the {which} left out")
+
+
+def test_a_time_given_twice_is_left_out_and_told() -> None:
+    times = channel(GOOD, "position").time_s.copy()
+    times[300] = times[299]
+    spoilt = replace(GOOD, position=replace(channel(GOOD, "position"), time_s=times))
+    assert_as_meant(estimate(spoilt, MODEL), "1 lost sample of the position left out")
+
+
+def test_too_many_lost_samples_are_not_made_up_for() -> None:
+    values = channel(GOOD, "force").values.copy()
+    values[:900] = math.nan
+    spoilt = replace(GOOD, force=replace(channel(GOOD, "force"), values=values))
+    assert "are not numbers" in estimate(spoilt, MODEL).mu_s.reason
+
+
+def test_the_rest_on_a_coarse_raster_is_no_lost_sample() -> None:
+    """Noise of a fifth of a step: where the part rests, values are equal for long, with some that are not."""
+    rng = np.random.default_rng(3)
+    whole = TAP.capture(None)
+    position = channel(whole, "position")
+    values = 5e-6 * np.round((position.values + rng.normal(0.0, 1e-6, len(position.values))) / 5e-6)
+    coarse = replace(whole, position=replace(position, values=values, noise_std=None))
+    assert extract(coarse).left_out == ()
+
+
+@pytest.mark.parametrize("offset_n", [-3.0, 0.5, 4.0])
+def test_an_offset_of_the_force_is_taken_off_and_told(offset_n: float) -> None:
+    values = channel(GOOD, "force").values + offset_n
+    found = estimate(replace(GOOD, force=replace(channel(GOOD, "force"), values=values)), MODEL)
+    assert_as_meant(found, "without contact, taken off: tare its sensor")
+    assert found.peak_force_n == pytest.approx(CLEAN.peak_force_n, abs=0.3)
+
+
+@pytest.mark.parametrize("offset_n", [40.0, -40.0])
+def test_a_large_offset_is_taken_off_where_samples_before_contact_show_it(offset_n: float) -> None:
+    force = channel(GOOD, "force")
+    before = np.arange(-500, 1) * 1e-5
+    rng = np.random.default_rng(4)
+    times = np.concatenate([before, force.time_s])
+    values = np.concatenate([rng.normal(0.0, 0.4, len(before)), force.values]) + offset_n
+    found = estimate(replace(GOOD, force=Channel(times, values, 0.4)), MODEL)
+    assert_as_meant(found, f"force stands at {offset_n:.0f}")
+
+
+@pytest.mark.parametrize("offset_m", [3e-5, -2e-3, 0.7])
+def test_position_may_be_counted_from_anywhere(offset_m: float) -> None:
+    """A recorder that counts from elsewhere made every tap one that the model misses."""
+    values = channel(GOOD, "position").values + offset_m
+    found = estimate(replace(GOOD, position=replace(channel(GOOD, "position"), values=values)), MODEL)
+    assert_as_meant(found, "")
+    assert found.mu_s.reason == ""
+
+
+@pytest.mark.parametrize(
+    ("what", "factor", "told"),
+    [("force", -1.0, "turn its sign"), ("position", -1.0, "turn the sign of position"),
+     ("force", 1e3, "see unit and scale"), ("mass", 2.0, "see unit and scale")],
+)  # fmt: skip
+def test_what_cannot_be_is_told_and_gives_no_friction(what: str, factor: float, told: str) -> None:
+    """A part of twice the mass had a friction that was uncertain, and wrong."""
+    if what == "mass":
+        spoilt = replace(GOOD, mass_kg=factor * GOOD.mass_kg)
+    else:
+        values = factor * channel(GOOD, what).values
+        spoilt = replace(GOOD, **{what: replace(channel(GOOD, what), values=values)})
+    found = estimate(spoilt, MODEL)
+    assert found.mu_s.quality is Quality.BAD
+    assert found.mu_k.quality is Quality.BAD
+    assert told in found.mu_s.reason.split("; ")[0]
+    assert german_reason(found.mu_s.reason.split("; ")[0]) != found.mu_s.reason.split("; ")[0]
