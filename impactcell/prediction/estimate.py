@@ -132,6 +132,7 @@ def _from_waveform(
 ) -> tuple[Coefficient, Coefficient, float]:
     """Coefficients as published, with a warning for a tap outside the calibration or unlike the model."""
     warnings = [beyond_calibration(model, capture, waveform.mu_s), *_told_otherwise(capture, waveform)]
+    warnings.append(waveform.record_fault)
     if waveform.misfit > MISFIT_THRESHOLD:
         warnings.append(
             f"residuals are {waveform.gap:.3g} times the sensors' noise: the model lacks something"

@@ -145,6 +145,20 @@ class LinearisedModel:
         other._weights = self._weights / factor  # noqa: SLF001  # its own copy
         return other
 
+    def disturbed_by(self, shape: Samples) -> "LinearisedModel":
+        """Give the same blocks and model with one more disturbance of the record, eliminated from the fit.
+
+        `shape`, (n,), is what one standard deviation of it adds to the blocks, in N and m.
+        """
+        other = copy(self)
+        other._disturbances = np.vstack([self._disturbances, shape])  # noqa: SLF001  # its own copy
+        return other
+
+    def size_of(self, shape: Samples, left: Samples) -> float:
+        """By how many of its standard deviations a disturbance of this shape leaves normalised residuals."""
+        weighted = shape * self._weights
+        return float(weighted @ left) / float(weighted @ weighted)
+
     def modelled(self, residual: Samples) -> tuple[Samples, Samples]:
         """Give the blocks of force [N] and position [m] that leave a residual."""
         model = self._values - residual / self._weights

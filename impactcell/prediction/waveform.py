@@ -21,6 +21,7 @@ from impactcell.prediction.linearised_model import (
     MU_K,
     ONSET,
     PARAMETERS,
+    WITH_RECORDER,
     LinearisedModel,
     parameter_count,
     parameters_of,
@@ -34,6 +35,7 @@ from impactcell.prediction.phase_reweighting import (
     std_factors,
 )
 from impactcell.prediction.posterior import Posterior, mixture
+from impactcell.prediction.record_faults import begun_at, record_fault
 from impactcell.prediction.tap_problem import GaussianPrior, Minimum, TapProblem
 from impactcell.records import Samples
 
@@ -47,6 +49,9 @@ SURELY_OVERCOME = 0.8
 """Share of a tap's largest force below which static friction surely was, noise and all. Our choice."""
 LARGEST_STD = 3.0
 """Standard deviation of ln mu from which on, a factor of twenty, a tap says nothing of friction."""
+OPEN_ONSET_S, SEEN_STDS = 1e-4, 6.0
+"""Standard deviation of first contact about t = 0 [s], as of triggers, that is tried of a tap that is missed;
+and how many of its own have to show it."""
 REWEIGHTING_ROUNDS = 3
 """Rounds of doubting the phases that the model misses."""
 
@@ -74,6 +79,8 @@ class WaveformFit:
     misfit : float
         The same for blocks. The standard deviations are widened by it where it is above 1; where it is well
         above, the phases that the model misses count for less (`impactcell.prediction.phase_reweighting`).
+    record_fault : str
+        What is wrong with the record, by what it explains.
     """
 
     mu_s: float
@@ -87,6 +94,7 @@ class WaveformFit:
     immediate: float
     gap: float
     misfit: float
+    record_fault: str = ""
 
 
 def prior_of(model: Model, parameters: int = PARAMETERS) -> GaussianPrior:
@@ -133,7 +141,37 @@ def fit(features: Features, model: Model) -> WaveformFit:
     mu_k = deceleration_friction(model, capture.mass_kg, slide) if is_seen else model.plant.mu_k
     theta[MU_K] = math.log(max(min(mu_k, _friction_overcome(features, model)), 1e-3))
     try:
-        return _fit(features, model.plant, prior, theta)
+        found = _fitted(features, model.plant, prior, theta)
+    except NotConvergedError as fault:
+        if (other := _begun_elsewhere(features, model, theta)) is None:
+            raise
+        return replace(other, gap=fault.gap)
+    other = _begun_elsewhere(features, model, theta) if found.misfit > MISFIT_THRESHOLD else None
+    return found if other is None else replace(other, gap=found.gap)
+
+
+def _begun_elsewhere(features: Features, model: Model, start: Samples) -> WaveformFit | None:
+    """Fit a tap with its first contact farther from t = 0; None where that does not explain it either."""
+    capture = features.capture
+    if capture.onset_std_s >= OPEN_ONSET_S:
+        return None
+    opened = replace(features, capture=replace(capture, onset_std_s=OPEN_ONSET_S))
+    theta = np.zeros(WITH_RECORDER)
+    theta[: len(start)] = start
+    try:
+        found = _fitted(opened, model.plant, prior_of(model, WITH_RECORDER), theta)
+    except NotConvergedError:
+        return None
+    onset, onset_std = found.posterior.moments(np.eye(WITH_RECORDER)[ONSET])
+    if found.misfit > MISFIT_THRESHOLD or abs(onset) < SEEN_STDS * onset_std:
+        return None
+    told = filter(None, (begun_at(1e6 * OPEN_ONSET_S * onset), found.record_fault))
+    return replace(found, record_fault="; ".join(told))
+
+
+def _fitted(features: Features, plant: Plant, prior: GaussianPrior, start: Samples) -> WaveformFit:
+    try:
+        return _fit(features, plant, prior, start)
     except PhysicsError as fault:
         raise NotConvergedError(f"the model does not make this tap: {fault}") from fault
     except np.linalg.LinAlgError as fault:
@@ -153,6 +191,15 @@ def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples)
         response = linearised_model(features, with_parameters(plant, plain.theta))
         fits = _fit_both_sides(response, prior, plain.theta)
         plain, misfit = _likelier_side(fits, prior, (kink_form, offset))
+    gap, told = response.gap(plain.residual), ""
+    fault = record_fault(response, prior, plain, fits=misfit <= MISFIT_THRESHOLD)
+    if fault is not None:
+        disturbed = response.disturbed_by(fault.shape)
+        others = _fit_both_sides(disturbed, prior, start)
+        other, other_misfit = _likelier_side(others, prior, (kink_form, offset))
+        if other_misfit <= MISFIT_THRESHOLD:
+            told = fault.told(response, other)
+            response, fits, plain, misfit = disturbed, others, other, other_misfit
     widening, best = max(misfit, 1.0), plain
     if misfit > MISFIT_THRESHOLD:
         widening = 1.0
@@ -164,7 +211,6 @@ def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples)
                 response.reweighted(std_factors(residual, phase) * LATE_FACTORS[phase]), prior, best.theta
             )
             best, _ = _likelier_side(fits, prior, (kink_form, offset))
-    gap = response.gap(plain.residual)
     if misfit > MAX_MISFIT:
         raise NotConvergedError(f"the model misses this tap: residuals are {gap:.3g} times the noise", gap)
     if not best.converged:
@@ -190,6 +236,7 @@ def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples)
         immediate=float(posterior.weights[slips_at_once].sum()),
         gap=gap,
         misfit=misfit,
+        record_fault=told,
     )
 
 

@@ -34,6 +34,17 @@ TAP_REASONS: Final[Mapping[str, str]] = {
     r"mass, and the sampling rates":
         r"die Kraft gab dem Teil \1 N s, seine Bewegung zeigt \2 N s: Einheit und Maßstab von Kraft, Weg und "
         r"Masse und die Abtastraten prüfen",
+    r"as if (force|position) were recorded (\S+) µs late against (force|position): check its filter and "
+    r"clock":
+        r"als wäre \1 um \2 µs später aufgezeichnet als \3: Filter und Takt dieses Kanals prüfen",
+    r"as if force stood (\S+) N off its zero: tare its sensor":
+        r"als stünde die Kraft \1 N neben ihrer Null: den Sensor nullen",
+    r"as if position stood (\S+) µm off its zero: check where it is counted from":
+        r"als stünde der Weg \1 µm neben seiner Null: prüfen, von wo er gezählt wird",
+    r"as if first contact lay (\S+) µs after t = 0: check the trigger":
+        r"als läge der erste Kontakt \1 µs nach t = 0: den Trigger prüfen",
+    r"as if first contact lay (\S+) µs before t = 0: check the trigger":
+        r"als läge der erste Kontakt \1 µs vor t = 0: den Trigger prüfen",
     r"from the mean deceleration of the slide": "aus der mittleren Verzögerung des Gleitens",
     r"through mu_k/mu_s of the model": "über µk/µs des Modells",
     r"by sliding distance only: (.+)": r"nur aus dem Gleitweg: \1",

@@ -1,0 +1,124 @@
+"""What a fit says of its record: a channel that is late, or does not stand at zero, by what it would explain.
+
+A channel that is late by tau shows f(t - tau), nearly f - tau f': its rate of change, which the model tells,
+is the shape of the fault. A late position and static friction look alike at the begin of a tap, which is why
+such a tap fits, with a wrong mu_s. Each shape is eliminated from the fit as one more unknown (a score test,
+Rao 1948); what its sum of squares falls by, all else fitted anew, is chi-square distributed with one degree
+of freedom where there is no fault.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from impactcell.prediction.linearised_model import MU_K, RATIO, LinearisedModel
+from impactcell.prediction.posterior import TruncatedGaussian
+from impactcell.prediction.tap_problem import GaussianPrior, Minimum
+from impactcell.records import Samples
+
+LATE_S, ZERO_N, ZERO_M = 3e-4, 3.0, 3e-5
+"""Usual sizes of these faults: latency of a filter or an interface, offset of the force and of position."""
+MIN_FALL = 30.0
+"""Fall of the sum of squares from which on it is no chance: 5.5 standard deviations, once in 2e7 taps."""
+MIN_MOVED_STD = 2.0
+"""What it has to move mu_s or mu_k by, in standard deviations, in a tap that fits without it. Our choice:
+what matters less is no reason to doubt a tap."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordFault:
+    """A fault of the record.
+
+    Attributes
+    ----------
+    shape : ndarray, shape (n,)
+        What a fault of the usual size adds to the blocks, N and m.
+    text, opposite : str
+        What is to be said of it and of its opposite, each with a place for its size.
+    scale : float
+        Its usual size, in the unit of the text.
+    """
+
+    shape: Samples
+    text: str
+    opposite: str
+    scale: float
+
+    def told(self, response: LinearisedModel, fitted: Minimum) -> str:
+        """Say it, with the size that a fit without it leaves where it was fitted with it."""
+        left = response.linearise(fitted.theta, fitted.side).residual - fitted.residual
+        size = self.scale * response.size_of(self.shape, left)
+        return (self.text if size > 0.0 else self.opposite).format(abs(size))
+
+
+def begun_at(onset_us: float) -> str:
+    """Say where first contact lies, by a fit."""
+    side = "after" if onset_us > 0.0 else "before"
+    return f"as if first contact lay {abs(onset_us):.2g} µs {side} t = 0: check the trigger"
+
+
+def record_fault(
+    response: LinearisedModel, prior: GaussianPrior, at: Minimum, *, fits: bool
+) -> RecordFault | None:
+    """Give the fault that explains most, where it is no chance; None where there is none.
+
+    Parameters
+    ----------
+    response : LinearisedModel
+    prior : GaussianPrior
+    at : Minimum
+        Of the fit without any.
+    fits : bool
+        Whether that explains the tap: then a fault has to matter for friction.
+    """
+    faults = _faults(response, at)
+    together = response
+    for fault in faults:
+        together = together.disturbed_by(fault.shape)
+    plain = at.truncated(prior)
+    if not _fall(plain, _with(together, prior, at)) > MIN_FALL:
+        return None
+    beside = [(_with(response.disturbed_by(fault.shape), prior, at), fault) for fault in faults]
+    other, fault = max(beside, key=lambda pair: _fall(plain, pair[0]))
+    if not _fall(plain, other) > MIN_FALL or (fits and _moved(plain, other) < MIN_MOVED_STD):
+        return None
+    return fault
+
+
+def _faults(response: LinearisedModel, at: Minimum) -> list[RecordFault]:
+    force, position = response.modelled(at.residual)
+    no_force, no_position = np.zeros_like(force), np.zeros_like(position)
+    rise = np.gradient(force, response.force_time_s)
+    speed = np.gradient(position, response.position_time_s)
+    position_late = "as if position were recorded {:.2g} µs late against force: check its filter and clock"
+    force_late = "as if force were recorded {:.2g} µs late against position: check its filter and clock"
+    force_off = "as if force stood {:.2g} N off its zero: tare its sensor"
+    position_off = "as if position stood {:.2g} µm off its zero: check where it is counted from"
+    late_us, zero_um = 1e6 * LATE_S, 1e6 * ZERO_M
+    return [
+        RecordFault(np.append(no_force, -LATE_S * speed), position_late, force_late, late_us),
+        RecordFault(np.append(-LATE_S * rise, no_position), force_late, position_late, late_us),
+        RecordFault(np.append(no_force + ZERO_N, no_position), force_off, force_off, ZERO_N),
+        RecordFault(np.append(no_force, no_position + ZERO_M), position_off, position_off, zero_um),
+    ]
+
+
+def _with(response: LinearisedModel, prior: GaussianPrior, at: Minimum) -> TruncatedGaussian:
+    linear = response.linearise(at.theta, at.side)
+    return Minimum(at.theta, at.side, linear, 0.5 * linear.chi2 + prior.cost(at.theta)).truncated(prior)
+
+
+def _fall(plain: TruncatedGaussian, other: TruncatedGaussian) -> float:
+    return 2.0 * (plain.cost - other.cost)
+
+
+def _moved(plain: TruncatedGaussian, other: TruncatedGaussian) -> float:
+    """By how many of its standard deviations ln mu_s or ln mu_k is moved, whichever is more."""
+    moved = []
+    for mu in (MU_K,), (MU_K, RATIO):
+        form = np.zeros(len(plain.mean))
+        form[list(mu)] = (1.0, -1.0)[: len(mu)]
+        std = math.sqrt(max(float(form @ plain.covariance @ form), 1e-30))
+        moved.append(abs(float(form @ (other.mean - plain.mean))) / std)
+    return max(moved)
