@@ -15,7 +15,6 @@ import numpy as np
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
 from impactcell.features import Features, SlideFeatures, required
 from impactcell.features.contact import refuse_clipped
-from impactcell.physics import Plant
 from impactcell.prediction.capture_blocks import linearised_model, recorder_std_of, until_next_contact
 from impactcell.prediction.linearised_model import (
     MU_K,
@@ -35,7 +34,7 @@ from impactcell.prediction.phase_reweighting import (
     std_factors,
 )
 from impactcell.prediction.posterior import Posterior, mixture
-from impactcell.prediction.record_faults import begun_at, record_fault
+from impactcell.prediction.record_faults import begun_at, may_have_begun_elsewhere, record_fault
 from impactcell.prediction.tap_problem import GaussianPrior, Minimum, TapProblem
 from impactcell.records import Samples
 
@@ -140,26 +139,17 @@ def fit(features: Features, model: Model) -> WaveformFit:
     is_seen = slide.deceleration.is_seen
     mu_k = deceleration_friction(model, capture.mass_kg, slide) if is_seen else model.plant.mu_k
     theta[MU_K] = math.log(max(min(mu_k, _friction_overcome(features, model)), 1e-3))
-    try:
-        found = _fitted(features, model.plant, prior, theta)
-    except NotConvergedError as fault:
-        if (other := _begun_elsewhere(features, model, theta)) is None:
-            raise
-        return replace(other, gap=fault.gap)
-    other = _begun_elsewhere(features, model, theta) if found.misfit > MISFIT_THRESHOLD else None
-    return found if other is None else replace(other, gap=found.gap)
+    return _fitted(features, model, prior, theta)
 
 
 def _begun_elsewhere(features: Features, model: Model, start: Samples) -> WaveformFit | None:
     """Fit a tap with its first contact farther from t = 0; None where that does not explain it either."""
     capture = features.capture
-    if capture.onset_std_s >= OPEN_ONSET_S:
-        return None
     opened = replace(features, capture=replace(capture, onset_std_s=OPEN_ONSET_S))
     theta = np.zeros(WITH_RECORDER)
     theta[: len(start)] = start
     try:
-        found = _fitted(opened, model.plant, prior_of(model, WITH_RECORDER), theta)
+        found = _fitted(opened, model, prior_of(model, WITH_RECORDER), theta)
     except NotConvergedError:
         return None
     onset, onset_std = found.posterior.moments(np.eye(WITH_RECORDER)[ONSET])
@@ -169,16 +159,17 @@ def _begun_elsewhere(features: Features, model: Model, start: Samples) -> Wavefo
     return replace(found, record_fault="; ".join(told))
 
 
-def _fitted(features: Features, plant: Plant, prior: GaussianPrior, start: Samples) -> WaveformFit:
+def _fitted(features: Features, model: Model, prior: GaussianPrior, start: Samples) -> WaveformFit:
     try:
-        return _fit(features, plant, prior, start)
+        return _fit(features, model, prior, start)
     except PhysicsError as fault:
         raise NotConvergedError(f"the model does not make this tap: {fault}") from fault
     except np.linalg.LinAlgError as fault:
         raise NotConvergedError(f"the fit is singular: {fault}") from fault
 
 
-def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples) -> WaveformFit:
+def _fit(features: Features, model: Model, prior: GaussianPrior, start: Samples) -> WaveformFit:
+    plant = model.plant
     response = linearised_model(features, with_parameters(plant, start))
     if (before := until_next_contact(response, features)) is not response:
         start = min(_fit_both_sides(before, prior, start), key=lambda minimum: minimum.cost).theta
@@ -197,9 +188,13 @@ def _fit(features: Features, plant: Plant, prior: GaussianPrior, start: Samples)
         disturbed = response.disturbed_by(fault.shape)
         others = _fit_both_sides(disturbed, prior, start)
         other, other_misfit = _likelier_side(others, prior, (kink_form, offset))
-        if other_misfit <= MISFIT_THRESHOLD:
+        if other.converged and other_misfit <= MISFIT_THRESHOLD:
             told = fault.told(response, other)
             response, fits, plain, misfit = disturbed, others, other, other_misfit
+    if misfit > MISFIT_THRESHOLD and features.capture.onset_std_s < OPEN_ONSET_S:
+        elsewhere = may_have_begun_elsewhere(response, prior, plain, OPEN_ONSET_S)
+        if elsewhere and (found := _begun_elsewhere(features, model, start)) is not None:
+            return replace(found, gap=gap)
     widening, best = max(misfit, 1.0), plain
     if misfit > MISFIT_THRESHOLD:
         widening = 1.0
