@@ -192,12 +192,8 @@ def _of_sums(mapping: Mapping, excitation: Excitation) -> list[str]:
             f"measured: leave the column out with --column 'ignored={name}', or say --excitation driven for "
             f"what is no tap"
         )
-    return [
-        (
-            f"position summed up from the speed {name!r}, from 0 at the first sample of each record: where "
-            f"that was is not known"
-        )
-    ]
+    begun = "from 0 at the first sample of each record: where that was is not known"
+    return [f"position summed up from the speed {name!r}, {begun}"]
 
 
 def _check_channels(records: Sequence[Record], mapping: Mapping, excitation: Excitation) -> None:

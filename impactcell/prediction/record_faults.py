@@ -96,10 +96,7 @@ def may_have_begun_elsewhere(
     It promises little of what it explains, a jump where there is another by the model; what a model lacks
     promised less than 30 in 60 taps, a trigger 60 µs off 77 and more.
     """
-    force, position = response.modelled(at.residual)
-    rise = np.gradient(force, response.force_time_s)
-    speed = np.gradient(position, response.position_time_s)
-    late = response.disturbed_by(-onset_std_s * np.append(rise, speed))
+    late = response.disturbed_by(-onset_std_s * np.append(*_rates(response, at)))
     return _fall(at.truncated(prior), _with(late, prior, at)) > MIN_FALL
 
 
@@ -108,11 +105,15 @@ def _unexplained(at: Minimum) -> float:
     return MIN_EXPLAINED * (at.chi2 - (len(at.residual) - len(at.theta)))
 
 
-def _faults(response: LinearisedModel, at: Minimum) -> list[RecordFault]:
+def _rates(response: LinearisedModel, at: Minimum) -> tuple[Samples, Samples]:
+    """Rates of change of force [N/s] and position [m/s] at the blocks, by the model."""
     force, position = response.modelled(at.residual)
-    no_force, no_position = np.zeros_like(force), np.zeros_like(position)
-    rise = np.gradient(force, response.force_time_s)
-    speed = np.gradient(position, response.position_time_s)
+    return np.gradient(force, response.force_time_s), np.gradient(position, response.position_time_s)
+
+
+def _faults(response: LinearisedModel, at: Minimum) -> list[RecordFault]:
+    rise, speed = _rates(response, at)
+    no_force, no_position = np.zeros_like(rise), np.zeros_like(speed)
     position_late = "as if position were recorded {:.2g} µs late against force: check its filter and clock"
     force_late = "as if force were recorded {:.2g} µs late against position: check its filter and clock"
     force_off = "as if force stood {:.2g} N off its zero: tare its sensor"

@@ -19,8 +19,10 @@ TAP_REASONS: Final[Mapping[str, str]] = {
     r"(\d+) outliers? of the force left out": r"\1 Ausreißer der Kraft weggelassen",
     r"(\d+) outliers? of the position left out": r"\1 Ausreißer des Wegs weggelassen",
     r"(\d+) outliers? of the actuator left out": r"\1 Ausreißer des Aktorwegs weggelassen",
-    r"(\d+) lost samples? of the (force|position) left out: check its cable and link":
-        r"\1 verlorene Werte von \2 weggelassen: Kabel und Verbindung prüfen",
+    r"(\d+) lost samples? of the force left out: check its cable and link":
+        r"verlorene Werte der Kraft weggelassen (\1): Kabel und Verbindung prüfen",
+    r"(\d+) lost samples? of the position left out: check its cable and link":
+        r"verlorene Werte des Wegs weggelassen (\1): Kabel und Verbindung prüfen",
     r"force stands at (\S+) N without contact, taken off: tare its sensor":
         r"die Kraft steht ohne Kontakt bei \1 N, abgezogen: den Sensor nullen",
     r"force pulls with (\S+) N, where a contact only pushes: turn its sign in the module or at its amplifier":
@@ -34,9 +36,10 @@ TAP_REASONS: Final[Mapping[str, str]] = {
     r"mass, and the sampling rates":
         r"die Kraft gab dem Teil \1 N s, seine Bewegung zeigt \2 N s: Einheit und Maßstab von Kraft, Weg und "
         r"Masse und die Abtastraten prüfen",
-    r"as if (force|position) were recorded (\S+) µs late against (force|position): check its filter and "
-    r"clock":
-        r"als wäre \1 um \2 µs später aufgezeichnet als \3: Filter und Takt dieses Kanals prüfen",
+    r"as if force were recorded (\S+) µs late against position: check its filter and clock":
+        r"als wäre die Kraft um \1 µs später aufgezeichnet als der Weg: Filter und Takt dieses Kanals prüfen",
+    r"as if position were recorded (\S+) µs late against force: check its filter and clock":
+        r"als wäre der Weg um \1 µs später aufgezeichnet als die Kraft: Filter und Takt dieses Kanals prüfen",
     r"as if force stood (\S+) N off its zero: tare its sensor":
         r"als stünde die Kraft \1 N neben ihrer Null: den Sensor nullen",
     r"as if position stood (\S+) µm off its zero: check where it is counted from":
