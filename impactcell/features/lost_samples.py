@@ -71,12 +71,15 @@ def _held_runs(values: Samples, repeated: NDArray[np.intp]) -> list[tuple[int, i
     firsts = repeated[np.concatenate([[0], breaks + 1])]
     lasts = repeated[np.concatenate([breaks, [len(repeated) - 1]])] + 1
     count = len(values)
-    ends = float(np.nanmin(values)), float(np.nanmax(values))
-    inner = (firsts > 0) & (lasts < count - 1) & ~np.isin(values[firsts], ends)
     chance = max(len(firsts) / (count - len(repeated)), 1.0 / count)
     if chance > MAX_CHANCE:
         return []
-    held = inner & (lasts - firsts > math.log(CHANCE / count) / math.log(chance))
+    held = lasts - firsts > math.log(CHANCE / count) / math.log(chance)
+    held &= (firsts > 0) & (lasts < count - 1)
+    if not held.any():
+        return []
+    ends = float(np.nanmin(values)), float(np.nanmax(values))
+    held &= ~np.isin(values[firsts], ends)
     if not held.any():
         return []
     finite = values[np.isfinite(values)]

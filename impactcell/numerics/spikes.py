@@ -1,8 +1,12 @@
 """Noise of a channel by its neighbours, and samples that are neither noise nor motion."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from impactcell.numerics.jit import compiled
+from impactcell.numerics.local_polynomial import median
 from impactcell.records import Samples
 
 NORMAL_SCALE = 1.4826
@@ -52,29 +56,45 @@ def spike_samples(values: Samples) -> NDArray[np.intp]:
     none = np.empty(0, dtype=np.intp)
     if len(values) < MIN_SAMPLES:
         return none
-    bends = np.abs(np.diff(values, 2))
-    rough = _noise_by_bends(bends[:: max(len(bends) // MAX_LOOKED_AT, 1)])
-    # A spike bends by its height at least, even where two of them lie side by side.
-    near = np.flatnonzero(bends > 0.5 * SPIKE_STD * rough) + 1
-    if not near.size:
-        return none
-    near = np.unique((near[:, None] + np.arange(-1, 2)).ravel())
-    near = near[(near >= MARGIN) & (near < len(values) - MARGIN - MAX_SPIKE_SAMPLES)]
-    away = values[near] - np.median(values[near[:, None] + np.arange(-2, 3)], axis=1)
-    near = near[np.abs(away) > 0.5 * SPIKE_STD * rough]
+    apart = max((len(values) - 2) // MAX_LOOKED_AT, 1)
+    after, here, before = values[2::apart], values[1:-1:apart], values[:-2:apart]
+    least_height = 0.5 * SPIKE_STD * _noise_by_bends(np.abs((after - here) - (here - before)))
+    near = _standing_out(values, least_height)
     if not near.size:
         return none
     steps = np.abs(np.diff(values))
     raster = float(steps[steps > 0.0].min())
-    least = max(
-        SPIKE_STD * _noise_by_bends(bends), SPIKE_SHARE * float(np.ptp(values)), RASTER_STEPS * raster
-    )
+    least = max(SPIKE_STD * noise_of(values), SPIKE_SHARE * float(np.ptp(values)), RASTER_STEPS * raster)
     found = [
         near[_are_spikes(values, near, width, least)] + i
         for width in range(1, MAX_SPIKE_SAMPLES + 1)
         for i in range(width)
     ]
     return np.unique(np.concatenate(found))
+
+
+@compiled
+def _standing_out(values: Samples, least: float) -> NDArray[np.intp]:
+    """Give samples, but for the margins, that are farther than `least` from the median of five about them.
+
+    Looked at is where a sample or one beside it bends by more: a spike bends by its height at least, even
+    where two of them lie side by side.
+    """
+    found = np.empty(len(values), dtype=np.intp)
+    count, bent = 0, 0
+    for i in range(MARGIN - 2, len(values) - MARGIN - MAX_SPIKE_SAMPLES):
+        if abs((values[i + 2] - values[i + 1]) - (values[i + 1] - values[i])) > least:
+            bent = i + 1
+        if i < MARGIN or bent < i - 1:
+            continue
+        above = below = 0
+        for j in range(i - 2, i + 3):
+            above += values[i] - values[j] > least
+            below += values[j] - values[i] > least
+        if max(above, below) > 2:  # so is their median
+            found[count] = i
+            count += 1
+    return found[:count].copy()
 
 
 def _are_spikes(values: Samples, first: NDArray[np.intp], width: int, least: float) -> NDArray[np.bool_]:
@@ -95,4 +115,4 @@ def _are_spikes(values: Samples, first: NDArray[np.intp], width: int, least: flo
 
 
 def _noise_by_bends(bends: Samples) -> float:
-    return float(NORMAL_SCALE * np.median(bends) / np.sqrt(6.0))
+    return NORMAL_SCALE * median(bends) / math.sqrt(6.0)

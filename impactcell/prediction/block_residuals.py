@@ -72,6 +72,23 @@ def linearise_blocks(
 
 
 @compiled
+def rates_of_change(times: Samples, values: Samples) -> Samples:
+    """Give the derivative, shape (n,), of the parabola through each value and its two neighbours.
+
+    At the ends it is that of the straight line to the one neighbour; 0 of a single value.
+    """
+    rates = np.zeros_like(values)
+    before, behind = 0.0, 0.0
+    for i in range(len(values) - 1):
+        after = times[i + 1] - times[i]
+        ahead = (values[i + 1] - values[i]) / after
+        rates[i] = (behind * after + ahead * before) / (before + after) if i else ahead
+        before, behind = after, ahead
+    rates[-1:] = behind
+    return rates
+
+
+@compiled
 def sample_squares(
     times: Samples,
     model: Samples,

@@ -75,12 +75,15 @@ class Linearisation:
         Product of the derivative with the residuals.
     chi2 : float
         Sum of squares of the residuals.
+    traces : (ndarray, ndarray), shapes ((p + 1) force blocks,), ((p + 1) position blocks,)
+        Force [N] and position [m] of the model at theta and, one after the other, beside it.
     """
 
     residual: Samples
     normal: Samples
     slope: Samples
     chi2: float
+    traces: tuple[Samples, Samples]
 
 
 class LinearisedModel:
@@ -137,7 +140,6 @@ class LinearisedModel:
         is_force = np.arange(self.size) < len(force.values)
         zeros = np.array([is_force * zero_std[0], ~is_force * zero_std[1]])
         self._disturbances = zeros[np.array(zero_std) > 0.0]
-        self._last: tuple[Samples, int, Samples, Samples] | None = None
         self._table = np.tile(self._ensemble.parameters(plant), (copies, 1))
 
     def reweighted(self, factor: Samples) -> "LinearisedModel":
@@ -155,10 +157,38 @@ class LinearisedModel:
         other._disturbances = np.vstack([self._disturbances, shape])  # noqa: SLF001  # its own copy
         return other
 
-    def size_of(self, shape: Samples, left: Samples) -> float:
-        """By how many of its standard deviations a disturbance of this shape leaves normalised residuals."""
-        weighted = shape * self._weights
-        return float(weighted @ left) / float(weighted @ weighted)
+    def size_of(self, shape: Samples, residual: Samples) -> float:
+        """Size of a disturbance of this shape, in its standard deviations, in a fit that has it.
+
+        With U its weighted shapes and S = U U' + 1 what is left of residuals r is r' = r - U' S^-1 U r, so
+        that U r' = S^-1 U r: the sizes that were eliminated.
+        """
+        return float((shape * self._weights) @ residual)
+
+    def products_with(self, shapes: Samples, fitted: Linearisation) -> tuple[Samples, Samples, Samples]:
+        """Products of disturbances that are not in a fit: with its residuals, its derivative, each other.
+
+        Parameters
+        ----------
+        shapes : ndarray, shape (d, n)
+            As for `disturbed_by`.
+
+        Returns
+        -------
+        ndarray, shape (d,); ndarray, shape (d, p); ndarray, shape (d, d)
+            All of what is left once the disturbances that are in the fit have been eliminated.
+        """
+        shapes = left = shapes * self._weights
+        if len(self._disturbances):
+            known = self._disturbances * self._weights
+            left = shapes - shapes @ known.T @ np.linalg.solve(known @ known.T + np.eye(len(known)), known)
+        split, copies = len(self.force_time_s), self.parameters + 1
+        force, position = fitted.traces
+        scaled = left * self._weights
+        with_traces = scaled[:, :split] @ force.reshape(copies, split).T
+        with_traces += scaled[:, split:] @ position.reshape(copies, self.size - split).T
+        with_derivative = (with_traces[:, :1] - with_traces[:, 1:]) / STEPS_OUT[: self.parameters]
+        return shapes @ fitted.residual, with_derivative, left @ shapes.T
 
     def modelled(self, residual: Samples) -> tuple[Samples, Samples]:
         """Give the blocks of force [N] and position [m] that leave a residual."""
@@ -222,12 +252,10 @@ class LinearisedModel:
         )
         if not math.isfinite(fields[3]):
             raise PhysicsError("the motion is not finite with these parameters")
-        return Linearisation(*fields)
+        return Linearisation(*fields, traces=(force, position))
 
     def _traces(self, theta: Samples, side: int) -> tuple[Samples, Samples]:
-        """Integrate the motion at `theta` and beside it; the last is kept, for other disturbances of it."""
-        if self._last is not None and self._last[1] == side and np.array_equal(self._last[0], theta):
-            return self._last[2:]
+        """Integrate the motion at `theta` and beside it."""
         count = self.parameters
         moved = theta + STEPS[: len(self._table), :count]
         rows = np.exp(moved[:, :PARAMETERS])
@@ -245,11 +273,9 @@ class LinearisedModel:
         table = self._table.copy()
         table[:, 0], table[:, 1], table[:, 2], table[:, 3] = rows[:, STIFFNESS], damping, mu_s, mu_k
         traces = self._ensemble.traces(table, mass_kg=mass_kg, velocity_m_s=velocity_m_s, onset_s=onset_s)
-        force, position = traces.force_n, traces.position_m
-        if count > PARAMETERS:
-            force, position = self._with_force_scale(force, position, theta[FORCE_SCALE])
-        self._last = theta.copy(), side, force, position
-        return force, position
+        if count == PARAMETERS:
+            return traces.force_n, traces.position_m
+        return self._with_force_scale(traces.force_n, traces.position_m, theta[FORCE_SCALE])
 
     def _with_force_scale(self, force: Samples, position: Samples, in_stds: float) -> tuple[Samples, Samples]:
         """Scale the force of all copies, and add the copy in which its scale is stepped."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from impactcell.prediction.block_residuals import rates_of_change
 from impactcell.prediction.linearised_model import MU_K, RATIO, LinearisedModel
 from impactcell.prediction.posterior import TruncatedGaussian
 from impactcell.prediction.tap_problem import GaussianPrior, Minimum
@@ -48,9 +49,8 @@ class RecordFault:
     scale: float
 
     def told(self, response: LinearisedModel, fitted: Minimum) -> str:
-        """Say it, with the size that a fit without it leaves where it was fitted with it."""
-        left = response.linearise(fitted.theta, fitted.side).residual - fitted.residual
-        size = self.scale * response.size_of(self.shape, left)
+        """Say it, with the size that it has in a fit with it."""
+        size = self.scale * response.size_of(self.shape, fitted.residual)
         return (self.text if size > 0.0 else self.opposite).format(abs(size))
 
 
@@ -75,17 +75,13 @@ def record_fault(
         Whether that explains the tap: then a fault has to matter for friction.
     """
     faults = _faults(response, at)
-    together = response
-    for fault in faults:
-        together = together.disturbed_by(fault.shape)
     plain = at.truncated(prior)
-    if not _fall(plain, _with(together, prior, at)) > MIN_FALL:
+    shown, together = _score(response, plain, at, np.array([fault.shape for fault in faults]))
+    if not together > MIN_FALL:
         return None
-    beside = [(_with(response.disturbed_by(fault.shape), prior, at), fault) for fault in faults]
-    other, fault = max(beside, key=lambda pair: _fall(plain, pair[0]))
-    fall = _fall(plain, other)
-    matters = _moved(plain, other) >= MIN_MOVED_STD if fits else fall >= _unexplained(at)
-    return fault if fall > MIN_FALL and matters else None
+    likeliest, fault = max(zip(shown, faults, strict=True), key=lambda pair: pair[0].fall)
+    matters = _moved_stds(plain, likeliest) >= MIN_MOVED_STD if fits else likeliest.fall >= _unexplained(at)
+    return fault if likeliest.fall > MIN_FALL and matters else None
 
 
 def may_have_begun_elsewhere(
@@ -96,8 +92,9 @@ def may_have_begun_elsewhere(
     It promises little of what it explains, a jump where there is another by the model; what a model lacks
     promised less than 30 in 60 taps, a trigger 60 µs off 77 and more.
     """
-    late = response.disturbed_by(-onset_std_s * np.append(*_rates(response, at)))
-    return _fall(at.truncated(prior), _with(late, prior, at)) > MIN_FALL
+    late = -onset_std_s * np.append(*_rates(response, at))
+    _, fall = _score(response, at.truncated(prior), at, late[None])
+    return fall > MIN_FALL
 
 
 def _unexplained(at: Minimum) -> float:
@@ -108,7 +105,10 @@ def _unexplained(at: Minimum) -> float:
 def _rates(response: LinearisedModel, at: Minimum) -> tuple[Samples, Samples]:
     """Rates of change of force [N/s] and position [m/s] at the blocks, by the model."""
     force, position = response.modelled(at.residual)
-    return np.gradient(force, response.force_time_s), np.gradient(position, response.position_time_s)
+    return (
+        rates_of_change(response.force_time_s, force),
+        rates_of_change(response.position_time_s, position),
+    )
 
 
 def _faults(response: LinearisedModel, at: Minimum) -> list[RecordFault]:
@@ -127,21 +127,38 @@ def _faults(response: LinearisedModel, at: Minimum) -> list[RecordFault]:
     ]
 
 
-def _with(response: LinearisedModel, prior: GaussianPrior, at: Minimum) -> TruncatedGaussian:
-    linear = response.linearise(at.theta, at.side)
-    return Minimum(at.theta, at.side, linear, 0.5 * linear.chi2 + prior.cost(at.theta)).truncated(prior)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Shown:
+    """What one more unknown does to a fit: what the sum of squares falls by, and how theta is moved."""
+
+    fall: float
+    moved: Samples
 
 
-def _fall(plain: TruncatedGaussian, other: TruncatedGaussian) -> float:
-    return 2.0 * (plain.cost - other.cost)
+def _score(
+    response: LinearisedModel, plain: TruncatedGaussian, at: Minimum, shapes: Samples
+) -> tuple[list[_Shown], float]:
+    """Give what each of the disturbances D, (d, n), does to a fit, and what the fit gains by all of them.
+
+    With derivative J, covariance C and residuals r at the quadratic's minimum each has D r to show, of
+    variance S = D D' + 1 - D J C J' D': the fall is (D r)' S^-1 (D r), and a size u moves theta by C J' D' u.
+    """
+    with_residual, with_derivative, with_each_other = response.products_with(shapes, at.linear)
+    with_residual = with_residual + with_derivative @ (plain.mean - at.theta)
+    moves = with_derivative @ plain.covariance
+    variance = with_each_other + np.eye(len(shapes)) - moves @ with_derivative.T
+    together = float(with_residual @ np.linalg.solve(variance, with_residual))
+    sizes = with_residual / variance.diagonal()
+    shown = [_Shown(float(r * u), u * move) for r, u, move in zip(with_residual, sizes, moves, strict=True)]
+    return shown, together
 
 
-def _moved(plain: TruncatedGaussian, other: TruncatedGaussian) -> float:
+def _moved_stds(plain: TruncatedGaussian, shown: _Shown) -> float:
     """By how many of its standard deviations ln mu_s or ln mu_k is moved, whichever is more."""
     moved = []
     for mu in (MU_K,), (MU_K, RATIO):
         form = np.zeros(len(plain.mean))
         form[list(mu)] = (1.0, -1.0)[: len(mu)]
         std = math.sqrt(max(float(form @ plain.covariance @ form), 1e-30))
-        moved.append(abs(float(form @ (other.mean - plain.mean))) / std)
+        moved.append(abs(float(form @ shown.moved)) / std)
     return max(moved)
