@@ -40,6 +40,12 @@ class UncertainNumber(_Part):
         return NumberPrior(self.value, math.inf if self.std == "free" else self.std)
 
 
+class NumberOfRecords(UncertainNumber):
+    """A number that may be another one in each record."""
+
+    each: Literal["record"] | None = None
+
+
 Number = FiniteFloat | UncertainNumber
 """A number that is exact, or `{value: ..., std: ...}`."""
 
@@ -64,7 +70,7 @@ class Nuisances(_Part):
 
     position_offset: Number = 0.0
     position_eccentricity: Number = 0.0
-    force_offset: Number = 0.0
+    force_offset: FiniteFloat | NumberOfRecords = 0.0
     force_gain: Number = 0.0
     delay_s: Number = 0.0
 
@@ -127,6 +133,11 @@ def read_base_model(path: Path) -> tuple[MachineModel, Excitation]:
         if fault:
             faults.append(yaml_loader.format_error(path, positions.value(("terms", number)), fault))
         choices.append(choice)
+    offset = file.nuisances.force_offset
+    by_record = isinstance(offset, NumberOfRecords) and offset.each is not None
+    if by_record and _prior(offset) != NumberPrior(0.0, math.inf):
+        fault = "what is another one in each record is free: write {std: free, each: record}"
+        faults.append(yaml_loader.format_error(path, positions.value(("nuisances", "force_offset")), fault))
     if faults:
         raise SettingsError("\n".join(faults))
     inertia = file.inertia_kg_m2 if file.coordinate == "rotation" else file.mass_kg
@@ -140,6 +151,7 @@ def read_base_model(path: Path) -> tuple[MachineModel, Excitation]:
         position_offset=_prior(nuisances.position_offset),
         position_eccentricity=_prior(nuisances.position_eccentricity),
         force_offset=_prior(nuisances.force_offset),
+        force_offset_by_record=by_record,
         force_gain=_prior(nuisances.force_gain),
         delay_s=_prior(nuisances.delay_s),
         block_s=math.nan if file.block_s is None else file.block_s,
@@ -167,6 +179,8 @@ def base_model_text(model: MachineModel, excitation: Excitation, provenance: dic
     mapping["nuisances"] = {
         name: _number(getattr(model, name)) for name in NUISANCES if turns or name != "position_eccentricity"
     }
+    if model.force_offset_by_record:
+        mapping["nuisances"]["force_offset"] = {"std": "free", "each": "record"}
     if math.isfinite(model.block_s):
         mapping["block_s"] = model.block_s
     mapping["provenance"] = provenance

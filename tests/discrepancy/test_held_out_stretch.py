@@ -76,6 +76,8 @@ def test_the_constant_force_of_each_lane_is_found() -> None:
         ({"force_offset": NumberPrior()}, False),
         ({"gravity_torque": NumberPrior(0.5)}, False),
         ({"gravity_torque": FREE}, False),
+        ({"gravity_torque": FREE, "force_offset": FREE, "force_offset_by_record": True}, True),
+        ({"response": Response.FORCE, "force_offset": FREE, "force_offset_by_record": True}, False),
         ({"response": Response.FORCE}, False),
         ({"terms": (TermChoice("restoring_force"),)}, False),
     ],

@@ -96,6 +96,8 @@ class BaseModel:
         e_c and e_s of an encoder that turns off its centre, which reads q + e_c cos q + e_s sin q [rad].
     force_offset : NumberPrior
         F_0 [N or N m].
+    force_offset_by_record : bool
+        Whether F_0 is another one in each record; it is free then.
     force_gain : NumberPrior
         g, relative error of the force [1].
     delay_s : NumberPrior
@@ -113,6 +115,7 @@ class BaseModel:
     position_offset: NumberPrior = NumberPrior()
     position_eccentricity: NumberPrior = NumberPrior()
     force_offset: NumberPrior = NumberPrior()
+    force_offset_by_record: bool = False
     force_gain: NumberPrior = NumberPrior()
     delay_s: NumberPrior = NumberPrior()
     block_s: float = math.nan

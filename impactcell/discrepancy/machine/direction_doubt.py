@@ -35,16 +35,24 @@ class DirectionDoubt(NamedTuple):
     floors: float = 1.0
 
 
-def weighed(rows: Rows, doubt: DirectionDoubt) -> Rows:
-    """Weigh rows by what is left of them in any case over that and their doubt; variances stay the sensors'.
+def row_weights(rows: Rows, doubt: DirectionDoubt) -> Samples:
+    """Weight of each row by what is left of it in any case over that and its doubt, shape (n,).
 
-    With u = DIRECTION_STD friction doubt and s² = floors² variance a row is multiplied by
-    sqrt(s² / (s² + u²)): what is not known of its friction counts no more than what the model leaves.
+    With u = DIRECTION_STD friction doubt and s² = floors² variance that is sqrt(s² / (s² + u²)): what is not
+    known of its friction counts no more than what the model leaves.
     """
     if doubt.friction == 0.0:
-        return rows
+        return np.ones_like(rows.target)
     left = doubt.floors**2 * rows.variance
-    weight = np.sqrt(left / (left + _doubt(rows, doubt.friction)))
+    weight: Samples = np.sqrt(left / (left + _doubt(rows, doubt.friction)))
+    return weight
+
+
+def weighed(rows: Rows, doubt: DirectionDoubt) -> Rows:
+    """Multiply rows by their weights; variances stay the sensors'."""
+    if doubt.friction == 0.0:
+        return rows
+    weight = row_weights(rows, doubt)
     return replace(
         rows,
         target=weight * rows.target,

@@ -14,6 +14,7 @@ from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, Machi
 from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
+from impactcell.discrepancy.machine.record_constants import constants_note
 from impactcell.discrepancy.machine.regression import Blocks
 from impactcell.discrepancy.machine.remainder import remainder_of
 from impactcell.discrepancy.machine.selection import SelectionStep, select_terms
@@ -72,6 +73,11 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
         explained = explained_by_delay(search, fits.columns(final.terms))
         notes = [*notes, *delay_note(explained)]
         steps = blamed_on_delay(steps, explained)
+    remainder = remainder_of(fits.rows(), final, fits.records)
+    notes = [
+        *notes,
+        *constants_note(remainder.constant_share, are_open=fits.base.force_offset_by_record),
+    ]
     return MachineFinding(
         base=fits.base,
         records=fits.records,
@@ -87,7 +93,7 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
         expected=expected_gap(settled[1], final),
         fall=fall_of_gap(held_out, nominal, final, seed, settled[1]),
         held_spans=fits.held_spans(),
-        remainder=remainder_of(fits.rows(), final, fits.records),
+        remainder=remainder,
         block_s=fits.block_s,
         scale=fits.scale,
         notes=tuple(notes),

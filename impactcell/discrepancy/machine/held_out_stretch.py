@@ -20,8 +20,9 @@ PULLING_BACK = frozenset(("restoring_force", "hardening_spring"))
 """Terms that bring a part back to a place."""
 OFFSET_NUDGE = 1e-3
 """Constant force that tells how far a motion drifts by one, over the largest of the drive."""
-OFFSET_STEPS = 2
-"""Runs by which it is found, before the first state is fitted and after; but for friction drift is linear."""
+OFFSET_STEPS, RECORD_STEPS = 2, 5
+"""Runs by which it is found, before the first state is fitted and after; but for friction drift is linear.
+The second where each record has one of its own, of the size of friction."""
 
 
 def first_state(position: Samples, step: float) -> tuple[float, float]:
@@ -58,13 +59,16 @@ def settled_start(
 
 
 def drifts(base: BaseModel) -> bool:
-    """Whether a constant force adds up in a simulated position, and the base model leaves it open.
+    """Whether each stretch that is simulated needs a constant force of its own, found from its position.
 
-    Nothing pulls back then: what the zero of the force moves between two records, tenths of a per cent of it,
-    carries the part away, and says nothing of any term.
+    It does where each record has one, and where one adds up that the base model leaves open: nothing pulls
+    back then, and what the zero of the force moves between two records, tenths of a per cent of it, carries
+    the part away, and says nothing of any term.
     """
+    if base.response is not Response.POSITION or base.force_offset.is_held:
+        return False
     pulls = pulls_back(base) or any(choice.law for choice in base.terms)
-    return base.response is Response.POSITION and not base.force_offset.is_held and not pulls
+    return base.force_offset_by_record or not pulls
 
 
 def pulls_back(base: BaseModel) -> bool:
@@ -78,6 +82,7 @@ def constant_forces(
     drives_and_measured: tuple[Sequence[Samples], Sequence[Samples]],
     constant: Samples,
     reach: float,
+    steps: int = OFFSET_STEPS,
 ) -> Samples:
     """Constant force of each lane by least squares of its positions, shape (lanes,).
 
@@ -91,12 +96,14 @@ def constant_forces(
         Where to begin.
     reach : float
         How large it may be [N or N m].
+    steps : int
+        By which it is found.
     """
     drives, measured = drives_and_measured
     lanes = len(measured)
     nudge = OFFSET_NUDGE * np.array([float(np.abs(drive).max()) for drive in drives])
     best, least = constant, np.full(lanes, np.inf)
-    for _ in range(OFFSET_STEPS):
+    for _ in range(steps):
         both = run(np.concatenate([constant, constant + nudge]))
         plain, slopes = both[:, :lanes], (both[:, lanes:] - both[:, :lanes]) / nudge
         squares = _squares(plain, measured)

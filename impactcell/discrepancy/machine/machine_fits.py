@@ -10,10 +10,12 @@ import numpy as np
 
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, TermChoice
 from impactcell.discrepancy.machine.delay import DELAY
-from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, weighed
+from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, row_weights, weighed
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.model_forces import friction_at_rest
+from impactcell.discrepancy.machine.nuisance_priors import nuisance_priors
+from impactcell.discrepancy.machine.record_constants import without_constants
 from impactcell.discrepancy.machine.regression import (
     BLOCKS_OF_RECORD,
     PIECES_PER_BLOCK,
@@ -26,7 +28,6 @@ from impactcell.discrepancy.machine.rival_forms import Basis
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, motion_scale
 from impactcell.discrepancy.machine.weak_form import (
-    ECCENTRICITY,
     Column,
     IndexArray,
     Rows,
@@ -35,6 +36,7 @@ from impactcell.discrepancy.machine.weak_form import (
     residual_of,
     shape_grid,
 )
+from impactcell.records import Samples
 
 RECORDS_FOR_FOLDS = 4
 """Training records from which on a fold of the cross-validation is a record [1]."""
@@ -49,8 +51,6 @@ WEIGHINGS = 3
 REFINEMENTS = 5
 """Rounds in which the grid of a shape is made finer about its best value, a round by a quarter."""
 COULOMB: Column = ("coulomb_friction", 0.0, 0)
-NUISANCES = ("force_gain", "force_offset", "gravity_torque", "position_offset", "inertia", "delay_s")
-"""Numbers of a base model that are columns of the regression."""
 
 
 class MachineFits:
@@ -81,11 +81,10 @@ class MachineFits:
         self.block_s = base.block_s if math.isfinite(base.block_s) else self.scale.period_s
         self.gravity = base.gravity_torque.value
         self.delay_s = base.delay_s.value
-        self.priors: dict[Column, NumberPrior] = {}
-        self._set_priors()
+        self.priors = nuisance_priors(base, self.gravity)
         self.doubt = DirectionDoubt()
         self._rows = lru_cache(maxsize=4)(self._build)
-        self._weighed = lru_cache(maxsize=4)(weighed)
+        self._prepared = lru_cache(maxsize=4)(self.prepared)
         self.shapes = {
             choice.name: shape_grid(term_of(choice), self.scale) for choice in (*base.terms, *self.candidates)
         }
@@ -98,18 +97,6 @@ class MachineFits:
         fits.shapes = dict(self.shapes)
         return fits
 
-    def _set_priors(self) -> None:
-        for name in NUISANCES:
-            prior: NumberPrior = getattr(self.base, name)
-            if prior.is_held or (name == "position_offset" and self.gravity == 0.0):
-                continue
-            # The columns are deviations from the stated value, that of the inertia relative to it.
-            std = prior.std / prior.value if name == "inertia" and math.isfinite(prior.value) else prior.std
-            self.priors[name, 0.0, 0] = NumberPrior(0.0, std)
-        if not self.base.position_eccentricity.is_held:
-            for number in range(2):
-                self.priors[ECCENTRICITY, 0.0, number] = self.base.position_eccentricity
-
     def _build(self, gravity: float, delay_s: float) -> Rows:
         shapes = self._shapes_of((*self.base.terms, *self.candidates))
         return build_rows(self.records, self.base, shapes, (gravity, delay_s))
@@ -119,8 +106,20 @@ class MachineFits:
         return {choice: self.shapes.get(choice.name, (0.0,)) for choice in choices}
 
     def rows(self) -> Rows:
-        """Rows at the gravity and delay of now, weighed."""
-        return self._weighed(self._rows(self.gravity, self.delay_s), self.doubt)
+        """Rows at the gravity and delay of now, as they are fitted."""
+        return self._prepared(self._rows(self.gravity, self.delay_s), self.doubt)
+
+    def prepared(self, rows: Rows, doubt: DirectionDoubt | None = None) -> Rows:
+        """Rows as they are fitted: weighed, and without what each record may have of its own."""
+        return self._without_constants(weighed(rows, doubt or self.doubt))
+
+    def _without_constants(self, rows: Rows, weight: Samples | None = None) -> Rows:
+        """Rows without a constant of each record, its part that is fitted and its part that is held out."""
+        if not self.base.force_offset_by_record:
+            return rows
+        number = self._number(rows)
+        _, held = self._fitted_and_held(number)
+        return without_constants(rows, 2 * rows.record.astype(np.int64) + np.isin(number, held), weight)
 
     @property
     def nonnegative(self) -> frozenset[Column]:
@@ -137,19 +136,27 @@ class MachineFits:
         """Rows at the same, of other terms beside the base model's, and of free forms in another basis."""
         shapes = self._shapes_of((*self.base.terms, *choices))
         rows = build_rows(self.records, self.base, shapes, (self.gravity, self.delay_s), basis)
-        return weighed(rows, self.doubt)
+        return self.prepared(rows)
 
     def _number(self, rows: Rows) -> IndexArray:
         """Block of each row."""
-        number: IndexArray = (BLOCKS_OF_RECORD * rows.record + np.floor(rows.time_s / self.block_s)).astype(
-            np.int64
-        )
-        return number
+        number: Samples = BLOCKS_OF_RECORD * rows.record + np.floor(rows.time_s / self.block_s)
+        return number.astype(np.int64)
 
     def blocks(self, rows: Rows | None = None) -> tuple[Blocks, Blocks]:
         """Training and held-out blocks of the rows of now, or of others."""
         rows = rows or self.rows()
         number = self._number(rows)
+        fitted, held = self._fitted_and_held(number)
+        records = sorted({block // BLOCKS_OF_RECORD for block in fitted})
+        if len(records) >= RECORDS_FOR_FOLDS:
+            fold = {block: records.index(block // BLOCKS_OF_RECORD) for block in fitted}
+        else:
+            fold = {block: place * FOLDS // len(fitted) for place, block in enumerate(fitted)}
+        return blocks_of(rows, number, fold), blocks_of(rows, number, dict.fromkeys(held, 0))
+
+    def _fitted_and_held(self, number: IndexArray) -> tuple[list[int], list[int]]:
+        """Whole blocks that fit, and those that are held out."""
         sizes = {
             int(block): int(count)
             for block, count in zip(*np.unique(number, return_counts=True), strict=True)
@@ -157,13 +164,7 @@ class MachineFits:
         usual = float(np.median([*sizes.values()]))
         whole = [block for block, count in sizes.items() if count >= 0.5 * usual]
         held = [block for block in whole if self._is_held(block, whole)]
-        fitted = [block for block in whole if block not in set(held)]
-        records = sorted({block // BLOCKS_OF_RECORD for block in fitted})
-        if len(records) >= RECORDS_FOR_FOLDS:
-            fold = {block: records.index(block // BLOCKS_OF_RECORD) for block in fitted}
-        else:
-            fold = {block: place * FOLDS // len(fitted) for place, block in enumerate(fitted)}
-        return blocks_of(rows, number, fold), blocks_of(rows, number, dict.fromkeys(held, 0))
+        return [block for block in whole if block not in set(held)], held
 
     def _is_held(self, block: int, whole: list[int]) -> bool:
         record = block // BLOCKS_OF_RECORD
@@ -197,7 +198,7 @@ class MachineFits:
                 fit = fit_blocks(training, self.columns(terms), self.priors, self.nonnegative)
                 place = fit.columns.index(("gravity_torque", 0.0, 0))
                 self.gravity = self.base.gravity_torque.value + float(fit.coefficients[place])
-                self._set_priors()
+                self.priors = nuisance_priors(self.base, self.gravity)
 
     def _settle_delay(self, terms: tuple[ChosenTerm, ...]) -> None:
         """Take the delay of least squares on the training blocks, with its prior."""
@@ -208,7 +209,7 @@ class MachineFits:
         def loss(delay: float) -> float:
             base = replace(self.base, delay_s=NumberPrior(delay))
             rows = build_rows(self.records, base, shapes, (self.gravity, delay))
-            training, _ = self.blocks(weighed(rows, self.doubt))
+            training, _ = self.blocks(self.prepared(rows))
             fit = fit_blocks(training, columns, self.priors, self.nonnegative)
             squares = float(training.losses(fit.columns, fit.coefficients).sum())
             piece = squares / (PIECES_PER_BLOCK * len(training))
@@ -219,7 +220,7 @@ class MachineFits:
         apart = float(tried[1] - tried[0])
         for _ in range(DELAY_ROUNDS):
             rows = build_rows(self.records, self.base, shapes, (self.gravity, self.delay_s))
-            training, _ = self.blocks(weighed(rows, self.doubt))
+            training, _ = self.blocks(self.prepared(rows))
             fit = fit_blocks(training, [*columns, DELAY], self.priors, self.nonnegative)
             nearer = prior.value + float(fit.coefficients[-1])
             self.delay_s = float(np.clip(nearer, self.delay_s - apart, self.delay_s + apart))
@@ -238,13 +239,14 @@ class MachineFits:
             level = fit_blocks(training, [*self.columns(own), COULOMB], self.priors, self.nonnegative)
             fit = fit_blocks(training, self.columns(model.terms), self.priors, self.nonnegative)
             rows = self._rows(self.gravity, self.delay_s)
+            rows = self._without_constants(rows, row_weights(rows, self.doubt))
             residual = residual_of(rows, fit.columns, fit.coefficients)
             at_rest = friction_at_rest(replace(model, fit=fit), self.records, self.scale)
             friction = max(float(level.coefficients[-1]), at_rest)
             chosen = np.isin(self._number(rows), training.number)
             self.doubt = DirectionDoubt(friction, floors_left(rows, residual, chosen, friction))
         self.gravity, self.delay_s = built_at
-        self._set_priors()
+        self.priors = nuisance_priors(self.base, self.gravity)
 
     def with_best_shapes(self, terms: tuple[ChosenTerm, ...]) -> tuple[ChosenTerm, ...]:
         """Give each term the shape of least squares, on its grid and between, one after the other."""
@@ -274,7 +276,7 @@ class MachineFits:
             return grid[0]
         shapes = {term.choice: (term.shape,) for term in terms} | {terms[place].choice: tuple(grid)}
         rows = build_rows(self.records, self.base, shapes, (self.gravity, self.delay_s))
-        training, _ = self.blocks(weighed(rows, self.doubt))
+        training, _ = self.blocks(self.prepared(rows))
 
         def loss(shape: float) -> float:
             other = (*terms[:place], ChosenTerm(terms[place].choice, shape), *terms[place + 1 :])

@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from impactcell.discrepancy.machine.direction_doubt import weighed
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.nuisance_priors import OFFSET
 from impactcell.discrepancy.machine.regression import fit_blocks
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.weak_form import Column, Rows, build_rows
@@ -34,7 +34,7 @@ def with_shape_intervals(fits: MachineFits, model: FittedModel) -> FittedModel:
     shapes = {term.choice: _beside(term.shape) if term in shaped else (term.shape,) for term in model.terms}
     rows = build_rows(fits.records, fits.base, shapes, (fits.gravity, fits.delay_s))
     slopes = {_slope_column(term): _slope(rows, model, term) for term in shaped}
-    training, _ = fits.blocks(weighed(replace(rows, columns={**_columns(rows, model), **slopes}), fits.doubt))
+    training, _ = fits.blocks(fits.prepared(replace(rows, columns={**_columns(rows, model), **slopes})))
     free = fit_blocks(training, [*model.fit.columns, *slopes], fits.priors, fits.nonnegative)
     half = 0.5 * (free.high - free.low)
     strengths, logs = half[: len(model.fit.columns)], half[len(model.fit.columns) :]
@@ -65,7 +65,7 @@ def _slope(rows: Rows, model: FittedModel, term: ChosenTerm) -> Samples:
 
 
 def _columns(rows: Rows, model: FittedModel) -> Mapping[Column, Samples]:
-    return {column: rows.columns[column] for column in model.fit.columns}
+    return {column: rows.columns[column] for column in (*model.fit.columns, OFFSET)}
 
 
 def _interval(shape: float, half: float) -> tuple[float, float]:

@@ -15,6 +15,8 @@ from scipy.ndimage import uniform_filter1d
 from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, OpenLoopError
 from impactcell.discrepancy.machine.held_out_stretch import (
+    OFFSET_STEPS,
+    RECORD_STEPS,
     START_PERIODS,
     constant_forces,
     drifts,
@@ -54,6 +56,11 @@ def simulate_held_out(finding: MachineFinding, model: FittedModel) -> OpenLoopEr
             averaged(record.force, _half_average(record, finding.scale), record.step_s)[stretch]
             for record, stretch in stretches
         ]
+        if model.base.force_offset_by_record:
+            simulated = [
+                force - np.nanmean(force - values) if np.isfinite(force).any() else force
+                for force, values in zip(simulated, measured, strict=True)
+            ]
     else:
         simulated = _positions(model, stretches, finding.scale.period_s)
         measured = [record.position[stretch] for record, stretch in stretches]
@@ -142,6 +149,7 @@ def _positions(
                 (pushes, places),
                 constant,
                 PRIOR_REACH * model.base.force_offset.std,
+                RECORD_STEPS if model.base.force_offset_by_record else OFFSET_STEPS,
             )
 
         constant = settled(start, constant)

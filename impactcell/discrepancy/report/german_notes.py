@@ -125,6 +125,12 @@ NOTES: Final[Patterns] = (
      lambda m: (f"Eine um {m[1]} ms zu {'spät' if m[2] == 'late' else 'früh'} aufgezeichnete Kraft erklärte "
                 f"{m[3]} % dessen, was bleibt: Mit delay_s unter den nuisances des Grundmodells wird die "
                 "Verzögerung mit allem anderen gefunden.")),
+    (r"A constant force of its own in each record would take (\d+) % of what remains: .*",
+     (r"Eine eigene konstante Kraft in jeder Messung erklärte \1 % dessen, was bleibt: force_offset: {std: "
+      r"free, each: record} unter den nuisances des Grundmodells lässt sie offen.")),
+    (r"Each record has a constant force of its own, .*",
+     ("Jede Messung hat ihre eigene konstante Kraft, auch die zurückgehaltenen: Abweichungen und Simulation "
+      "sind von dem, was sie übrig lässt, mit dem Genannten und ohne es.")),
     (r"There are ([\d.]+) samples in a period of the fastest motion: .*, (\d+) samples for one\.",
      (r"Auf eine Periode der schnellsten Bewegung kommen \1 Messwerte: Zwischen ihnen gilt sie als Summe von "
       r"Sinuswellen unter der halben Abtastrate, \2 Werte für einen.")),

@@ -8,6 +8,11 @@ DRIFTS = (
     "record has one of its own, with what is named and without."
 )
 """What is said where the zero of the force is each held-out record's own."""
+BY_RECORD = (
+    "Each record has a constant force of its own, held-out ones as well: gaps and simulation are of what it "
+    "leaves, with what is named and without."
+)
+"""The same where the base model says so."""
 
 
 def notes_of_simulation(finding: MachineFinding, errors: tuple[OpenLoopError, OpenLoopError]) -> list[str]:
@@ -22,7 +27,9 @@ def notes_of_simulation(finding: MachineFinding, errors: tuple[OpenLoopError, Op
     before, after = (error.rmse for error in errors)
     base = finding.base
     notes = []
-    if drifts(base):
+    if base.force_offset_by_record:
+        notes.append(BY_RECORD)
+    elif drifts(base):
         notes.append(DRIFTS)
     if finding.established and after > before:
         force, position = ("N m", "rad") if base.coordinate is Coordinate.ROTATION else ("N", "m")
