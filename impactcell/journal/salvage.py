@@ -25,12 +25,15 @@ class StoredCapture:
         Its place in the journal.
     cycle : int
         Number of its cycle; 0 where that cannot be read.
+    batch_id : str
+        Batch that the cell took it for, which a person may have named; empty without one.
     blob : bytes or None
         None where it cannot be read.
     """
 
     seq: int
     cycle: int
+    batch_id: str
     blob: bytes | None
 
 
@@ -61,7 +64,7 @@ def stored_captures(database: sqlite3.Connection, newest: int | None = None) -> 
             if row is None:
                 return
             seq = row[0]
-            yield StoredCapture(seq, _cycle(database, seq), bytes(row[1]))
+            yield StoredCapture(seq, *_cycle(database, seq), bytes(row[1]))
         seq += 1
 
 
@@ -97,16 +100,17 @@ def _one(database: sqlite3.Connection, seq: int) -> StoredCapture | None:
     try:
         row = database.execute(_ONE, (seq,)).fetchone()
     except sqlite3.DatabaseError:
-        return StoredCapture(seq, _cycle(database, seq), None)
-    return None if row is None else StoredCapture(seq, _cycle(database, seq), bytes(row[0]))
+        return StoredCapture(seq, *_cycle(database, seq), None)
+    return None if row is None else StoredCapture(seq, *_cycle(database, seq), bytes(row[0]))
 
 
-def _cycle(database: sqlite3.Connection, seq: int) -> int:
+def _cycle(database: sqlite3.Connection, seq: int) -> tuple[int, str]:
+    """Give number and batch of the cycle in this place; 0 and none where it cannot be read."""
     try:
-        row = database.execute("SELECT cycle FROM cycles WHERE seq = ?", (seq,)).fetchone()
+        row = database.execute("SELECT cycle, batch_id FROM cycles WHERE seq = ?", (seq,)).fetchone()
     except sqlite3.DatabaseError:
-        return 0
-    return 0 if row is None else int(row[0])
+        row = None
+    return (0, "") if row is None else (int(row[0]), row[1] or "")
 
 
 def _last(database: sqlite3.Connection) -> int:

@@ -9,7 +9,7 @@ A `Journal` is used from one thread at a time; `impactcell.service.worker` gives
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -208,6 +208,8 @@ class Journal:
     ) -> Iterator[Capture]:
         """Yield the stored captures in order of their cycles; those that were dropped are gone.
 
+        Their batch is the one that the cell took each for: the module's, or what a person said in its place.
+
         Parameters
         ----------
         first_cycle, last_cycle : int or None
@@ -227,7 +229,8 @@ class Journal:
                 if not (first_cycle or 0) <= stored.cycle <= (math.inf if last_cycle is None else last_cycle):
                     continue
                 try:
-                    yield decode_capture(stored.blob)
+                    capture = decode_capture(stored.blob)
+                    yield replace(capture, batch_id=stored.batch_id or capture.batch_id)
                 except JournalDamagedError as error:
                     name = f"cycle {stored.cycle}" if stored.cycle else f"the {stored.seq}th cycle"
                     if damaged is None:

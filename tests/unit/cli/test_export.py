@@ -40,6 +40,20 @@ def test_round_trip(tmp_path: Path) -> None:
         assert now.velocity_m_s == pytest.approx(was.velocity_m_s)
 
 
+def test_a_batch_that_a_person_named_is_exported(tmp_path: Path) -> None:
+    """A module that says nothing of batches left the column empty, whatever StartBatch had said."""
+    silent = [replace(make_capture(cycle), batch_id=None) for cycle in (1, 2, 3)]
+    with Journal(tmp_path / "j", "press-1") as journal:
+        for capture, batch_id in zip(silent, ("", "lot 17", "lot 17"), strict=True):
+            snapshot = make_snapshot(capture)
+            journal.append(
+                capture, replace(snapshot, batch=replace(snapshot.batch, batch_id=batch_id)), b"state"
+            )
+    export(tmp_path / "j", tmp_path / "campaign")
+    back = campaign.read(tmp_path / "campaign")
+    assert [shot.batch_id for shot in back.shots] == [None, "lot 17", "lot 17"]
+
+
 def test_repeated_cycle_numbers_are_counted_anew(tmp_path: Path) -> None:
     fill(tmp_path / "j", [make_capture(1, session=1), make_capture(1, session=2)])
     export(tmp_path / "j", tmp_path / "campaign")
