@@ -12,6 +12,7 @@ from impactcell.campaign import write as write_directory
 from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements.alike import check_channels_alike, check_scalars_alike, left_empty
 from impactcell.measurements.captures import channel_of, described
+from impactcell.measurements.excitation import SWAPPED, excitation_of, looks_swapped
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Given, Mapping
 from impactcell.measurements.measured_records import Record, records_of
@@ -25,13 +26,6 @@ from impactcell.records import MM_PER_MIN, Capture, Channel, Samples
 
 STANDARD_GRAVITY_M_S2 = 9.81
 """Acceleration of free fall where nothing is given; the campaign format's own default."""
-PULSE_SHARE = 0.4
-"""Share of a record in which the force is above half its range: a tap's contact is shorter, a drive is
-not."""
-DRIVE_REVERSAL = 0.25
-"""Force of the other sign as a share of the largest from which on it drives both ways; a contact only
-pushes."""
-
 ROTATING = (Dimension.TORQUE, Dimension.ANGLE, Dimension.ANGULAR_VELOCITY, Dimension.INERTIA)
 """Units of force, position and mass where the coordinate is an angle."""
 
@@ -65,7 +59,7 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     records = records_of(tables, mapping)
     check_channels_alike(records, mapping)
     notes = _said_of(tables, given)
-    excitation = given.excitation or _excitation(records, notes)
+    excitation = given.excitation or excitation_of(records, notes)
     _check_channels(records, mapping, excitation)
     notes += _of_sums(mapping, excitation)
     check_scalars_alike(tables, mapping, excitation)
@@ -77,6 +71,8 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     else:
         captures = [_whole(number, record, given) for number, record in enumerate(records, 1)]
         notes += _of_taps_only(given)
+    is_swapped = looks_swapped(records)
+    notes += [SWAPPED] if is_swapped else []
     if all(math.isnan(capture.mass_kg) for capture in captures):
         notes.append(_without_mass(coordinate))
     if excitation is Excitation.TAP and "stroke" not in given.constants:
@@ -98,7 +94,8 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     try:
         refuse_unusable(campaign, data_faults)
     except CampaignError as error:
-        raise MeasurementError(f"{records[0].place}: {error}") from error
+        told = SWAPPED if is_swapped else error
+        raise MeasurementError(f"{records[0].place}: {told}") from error
     return Imported(campaign, (*notes, *notes_of(data_faults)))
 
 
@@ -148,30 +145,6 @@ def _said_of(tables: Sequence[Table], given: Given) -> list[str]:
             low, high = factor * min(values), factor * max(values)
             told.append(f"{meaning} {low:.6g}{'' if low == high else f' to {high:.6g}'} {unit}")
     return [f"the lines beside the columns say: {', '.join(told)}"] if told else []
-
-
-def _excitation(records: Sequence[Record], notes: list[str]) -> Excitation:
-    """Tell contacts, which push for a short while, from a drive; without force the part slides freely."""
-    forces = [
-        record.values[ColumnMeaning.FORCE] for record in records if ColumnMeaning.FORCE in record.values
-    ]
-    if not forces:
-        notes.append("excitation free_slide: no force was recorded (--excitation says otherwise)")
-        return Excitation.FREE_SLIDE
-    drives = 0
-    for force in forces:
-        centred = force - np.median(force)
-        largest = float(np.abs(centred).max())
-        pulse = float(np.mean(np.abs(centred) > 0.5 * largest)) < PULSE_SHARE
-        both = min(centred.max(), -centred.min()) > DRIVE_REVERSAL * largest
-        drives += both or not pulse
-    if 2 * drives > len(forces):
-        notes.append(
-            "excitation driven: the force acts all the time or both ways (--excitation says otherwise)"
-        )
-        return Excitation.DRIVEN
-    notes.append("excitation tap: the force is a short push (--excitation says otherwise)")
-    return Excitation.TAP
 
 
 def _of_sums(mapping: Mapping, excitation: Excitation) -> list[str]:

@@ -9,63 +9,12 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from impactcell.discrepancy.report.german_words import phrase, term_name
+from impactcell.german.data_faults import german_data_fault
 from impactcell.german.findings import with_decimal_commas
 from impactcell.physics.effect_names import identifier_of
 
 Patterns = Sequence[tuple[str, str | Callable[[re.Match[str]], str]]]
 """English as a pattern, and German as that is expanded; a function gives nothing where it knows no part."""
-ENDS: Final = {"upper": "oberen", "lower": "unteren"}
-"""Ends of a channel's range."""
-FAULTS: Final = {
-    "outliers": "Ausreißer",
-    "clipping": "Begrenzung",
-    "dropouts": "Aussetzer",
-    "drift": "Drift",
-    "late channel": "verspäteter Kanal",
-    "constant channel": "konstanter Kanal",
-    "no motion": "keine Bewegung",
-    "presliding only": "nur Vorgleiten",
-}
-"""Kinds of what is wrong with data."""
-DATA_FAULTS: Final[Patterns] = (
-    (r"the (\w+) is constant at (\S+): .*",
-     lambda m: f"{phrase(m[1])} steht konstant auf {m[2]}: nicht angeschlossen, oder die falsche Spalte"),
-    (r"(\d+) outliers in the (\w+), the first at (\S+) s \((\S+) amid (\S+)\): .*",
-     lambda m: f"Ausreißer ({phrase(m[2])}): {m[1]}, der erste bei {m[3]} s ({m[4]} inmitten von {m[5]}): "
-     "Kabel und Schirmung prüfen"),
-    (r"the (\w+) stands at its (\w+) end, (\S+), for (\d+) samples from (\S+) s \((\d+) in all\): .*",
-     lambda m: f"{phrase(m[1])} steht {m[4]} Messwerte lang am {ENDS[m[2]]} Ende, {m[3]}, ab {m[5]} s "
-     f"({m[6]} insgesamt): abgeschnitten; einen weiteren Messbereich wählen"),
-    (r"the (\w+) is stuck at (\S+) for (\d+) samples from (\S+) s \((\d+) such stretches\): .*",
-     lambda m: f"{phrase(m[1])} bleibt {m[3]} Messwerte lang auf {m[2]} stehen, ab {m[4]} s (so an {m[5]} "
-     "Stellen): Messwerte gingen verloren"),
-    (r"samples of the (\w+) are missing in (\d+)(?: places?)?, the first for (\S+) ms from (\S+) s: .*",
-     lambda m: f"{phrase(m[1])}: Messwerte fehlen an {m[2]} Stelle{'n' * (m[2] != '1')}, zuerst {m[3]} ms "
-     f"lang ab {m[4]} s: was dabei geschah, ist verloren"),
-    (r"the part does not move: its position stays within (\S+) (m|rad), noise is (\S+) (?:m|rad)",
-     r"das Teil bewegt sich nicht: seine Position bleibt innerhalb von \1 \2, das Rauschen ist \3 \2"),
-    (r"its position follows the force as on a spring: .*",
-     ("seine Position folgt der Kraft wie an einer Feder: es gleitet nie, oder eine Feder oder sein Gewicht "
-      "überwiegt die Reibung bei weitem; stärker antreiben")),
-    (r"the part never slides: it moves by (\S+) (m|rad) and springs back, .*",
-     r"das Teil gleitet nie: es bewegt sich um \1 \2 und federt zurück (Vorgleiten); stärker stoßen"),
-    (r"the (\w+) is recorded (\S+) ms after the (\w+) \((\d+) shots\): .*",
-     lambda m: f"{phrase(m[1])} ist {m[2]} ms später aufgezeichnet als {phrase(m[3])} ({m[4]} Stöße): "
-     "Filter und Uhr dieses Kanals prüfen, bevor ein Gesetz schuld ist"),
-    (r"the force at rest goes from (\S+) N to (\S+) N over (\d+) shots: .*",
-     r"die Kraft in Ruhe geht von \1 N auf \2 N über \3 Stöße: Sensor tarieren, warm werden lassen"),
-)  # fmt: skip
-"""Messages of `impactcell.quality`."""
-
-
-def _data_fault(match: re.Match[str]) -> str:
-    kind, shot, message, others = match.groups()
-    place = "" if shot is None else f"Stoß {shot}: "
-    more = "" if others is None else f"; ebenso in weiteren Stößen: {others}"
-    said = _of(message, DATA_FAULTS)
-    return "" if said is None else f"Daten, {FAULTS[kind]}: {place}{said}{more}."
-
-
 AT_REST: Final = {"before contact": "vor dem Kontakt", "after the tap": "nach dem Stoß"}
 """When a part lies still."""
 SETTINGS: Final = {"velocity": "Die Geschwindigkeit", "mass": "Die Masse"}
@@ -73,7 +22,7 @@ SETTINGS: Final = {"velocity": "Die Geschwindigkeit", "mass": "Die Masse"}
 LIKE: Final = {"velocity": "", "mass": "; eine Kraft mit falschem Maßstab sähe ebenso aus"}
 """What looks the same."""
 NOTES: Final[Patterns] = (
-    (r"Data, ([^:]+): (?:shot (\d+): )?(.*?)(?:; the like in (\d+) more shots)?\.", _data_fault),
+    (r"Data, .*", lambda m: german_data_fault(m[0]) or ""),
     (r"The noise of (\w+) is not stated; (\S+ \S+) was .* at rest ([^,]+), (\S+) times .* state (\w+) of .*",
      lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus Messwerten in Ruhe "
      f"{AT_REST[m[3]]} geschätzt, das {m[4]}-Fache dessen, was benachbarte zeigen: es ist korreliert "

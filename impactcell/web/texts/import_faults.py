@@ -3,7 +3,8 @@
 import re
 from typing import Final, NamedTuple
 
-from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES
+from impactcell.german.data_faults import german_message
+from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, with_decimal_commas
 from impactcell.web.texts.import_notes import page_note
 
 PLACE: Final = r"(?P<place>(?:.+?: )?)"
@@ -206,8 +207,20 @@ FAULTS: Final = (
         "die Geschwindigkeit des Antriebs ist nicht bekannt{why}; unten im Formular die Spalte der "
         "befohlenen wählen oder sie dort für alle Stöße angeben",
     ),
+    _Fault(
+        r"the position is a short push, as the force of a tap is, .*",
+        "the position is a short push, as the force of a tap is, and the force stays where it went, as a "
+        "part does: they look swapped; choose their columns, and give their units, in the form below",
+        "die Position ist ein kurzer Stoß wie sonst die Kraft, und die Kraft bleibt am Ende, wie sonst die "
+        "Position: beide scheinen vertauscht; unten im Formular ihre Spalten wählen und ihre Einheiten "
+        "angeben",
+    ),
 )
 """What `impactcell import` says, as patterns; what the page says in English, and in German."""
+REFUSED: Final = re.compile(
+    PLACE + r"shot (?P<shot>\d+): (?P<message>.+) \(and so in all (?P<all>\d+) shots\)", re.DOTALL
+)
+"""Data of which no shot can be used."""
 DATES: Final = {
     "dates": "ein Datum, bei dem Tag und Monat vertauscht sein können",
     "days": "Tage ohne Uhrzeit",
@@ -246,7 +259,12 @@ def page_fault(fault: str, language: str) -> tuple[str, str]:
         if language == "de":
             said |= _in_german(said)
         return language, said["place"] + (kind.german if language == "de" else kind.english).format_map(said)
-    return "en", fault
+    refused = REFUSED.fullmatch(fault)
+    german = None if refused is None or language != "de" else german_message(refused["message"])
+    if refused is None or german is None:
+        return "en", fault
+    message = with_decimal_commas(f"Stoß {refused['shot']}: {german}")
+    return "de", f"{refused['place']}{message} (und so in allen {refused['all']} Stößen)"
 
 
 def _in_german(said: dict[str, str]) -> dict[str, str]:

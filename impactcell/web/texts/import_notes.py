@@ -3,6 +3,7 @@
 import re
 from typing import Final
 
+from impactcell.german.data_faults import german_data_fault
 from impactcell.german.findings import with_decimal_commas
 
 OPTION: Final = re.compile(r" \(--[^)]*\)|; give --set .*")
@@ -13,6 +14,11 @@ GERMAN: Final = {
     r"excitation free_slide: no force was recorded": "Anregung freies Gleiten: keine Kraft aufgezeichnet",
     r"excitation driven: the force acts all the time or both ways":
         "Anregung durch eine Kraft, die ständig oder in beiden Richtungen wirkt",
+    r"the position is a short push, as the force of a tap is, and the force stays .*":
+        "die Position ist ein kurzer Stoß wie sonst die Kraft, und die Kraft bleibt am Ende, wie sonst "
+        "die Position: beide scheinen vertauscht",
+    r"given, and not used, for it is of taps: (.+)":
+        r"angegeben und nicht verwendet, weil es nur für Stöße gilt: \1",
     r"force turned: it was negative in compression": "Kraft umgekehrt: sie war bei Druck negativ",
     r"position summed up from the speed (['\"])(.+)\1, from 0 at the first sample of each record: where that "
     r"was is not known":
@@ -44,10 +50,17 @@ GERMAN: Final = {
     r"the only column in (\S+)": r"einzige Spalte in \1",
     r"none of the known quantities": "keine der bekannten Größen",
     r"a speed, as the position has it": "eine Geschwindigkeit, wie sie aus der Lage folgt",
+    r"counts the rows": "zählt die Zeilen",
+    r"given": "angegeben",
 }  # fmt: skip
 """Notes and reasons as patterns; what is in none of them stays English."""
-WORDS: Final = {"mass": "Masse", "velocity": "Geschwindigkeit", "to": "bis"}
-"""What a note on the lines beside the columns is made of."""
+WORDS: Final = {
+    "mass": "Masse", "velocity": "Geschwindigkeit", "stroke": "Hub", "direction": "Richtung",
+    "trigger": "Kraft bei Berührung", "to": "bis",
+}  # fmt: skip
+"""What was given for all shots, and what a note on the lines beside the columns is made of."""
+OF_WORDS: Final = re.compile(r"(?:sagen|gilt): ")
+"""Behind it stand such words."""
 
 
 def page_note(note: str, language: str) -> tuple[str, str]:
@@ -59,11 +72,13 @@ def page_note(note: str, language: str) -> tuple[str, str]:
     ('de', 'die Zeilen neben den Spalten sagen: Masse 12,5 bis 15 kg')
     """
     text = OPTION.sub("", note)
+    if language == "de" and (data_fault := german_data_fault(text)) is not None:
+        return "de", with_decimal_commas(data_fault).removesuffix(".")
     for pattern, german in GERMAN.items() if language == "de" else ():
         match = re.fullmatch(pattern, text)
         if match is not None:
             told = match.expand(german)
-            if "sagen: " in german:
-                told = re.sub(r"\b(mass|velocity|to)\b", lambda word: WORDS[word[0]], told)
+            if OF_WORDS.search(german):
+                told = re.sub(rf"\b({'|'.join(WORDS)})\b", lambda word: WORDS[word[0]], told)
             return "de", with_decimal_commas(told)
-    return "en", text
+    return "en", text.removesuffix(".")

@@ -2,12 +2,15 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from impactcell.errors import MeasurementError
-from impactcell.measurements import Given, guess, make_campaign, read_tables
+from impactcell.measurements import Given, Table, guess, make_campaign, read_tables
+from impactcell.measurements.excitation import SWAPPED
 from impactcell.measurements.given import read_given
 from impactcell.web.texts.import_faults import page_fault
+from impactcell.web.texts.import_notes import page_note
 
 ZEROS = "".join(f"{n};0;0;3000\n" for n in range(60))
 """A record in which nothing is struck."""
@@ -115,3 +118,49 @@ def test_what_a_second_file_lacks_is_said_in_both_languages(tmp_path: Path) -> N
         f"etwa {unit}"
         for name, meaning, unit in (("Zeit", "Zeit", "s"), ("Kraft", "Kraft", "N"), ("Weg", "Position", "m"))
     ]
+
+
+def tap_files(directory: Path, *, is_swapped: bool, moves_m: float) -> list[Table]:
+    """Three taps of a force of 100 N for 10 ms, of a part that is moved, or springs back where that is 0."""
+    time = np.arange(0.0, 0.1, 1e-4)
+    since = np.clip(time - 0.03, 0.0, 0.01)
+    force = 100.0 * np.sin(np.pi * since / 0.01)
+    position = moves_m * since / 0.01 if moves_m else 1e-5 * force
+    for number in range(3):
+        noise = np.random.default_rng(number).normal(size=(2, time.size))
+        one, other = force + 0.4 * noise[0], position + 1e-6 * noise[1]
+        columns = (time, other, one) if is_swapped else (time, one, other)
+        rows = [f"{t:.4f},{a:.7f},{b:.7f}" for t, a, b in zip(*columns, strict=True)]
+        head = "mass: 18.9 kg\nvelocity: 3000 mm/min\n\ntime [s],force [N],position [m]"
+        (directory / f"{number}.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
+    return [table for file in sorted(directory.iterdir()) for table in read_tables(file)]
+
+
+def test_force_and_position_that_are_swapped_are_told(tmp_path: Path) -> None:
+    """Such taps became those of a drive without a word, or were to be struck harder."""
+    tables = tap_files(tmp_path, is_swapped=True, moves_m=2e-3)
+    driven = read_given({}, None, "driven", None)
+    assert SWAPPED in make_campaign(tables, guess(tables, driven)).notes
+    said = {language: page_note(SWAPPED, language)[1] for language in ("en", "de")}
+    assert said["en"].endswith("they look swapped")
+    assert said["de"].endswith("beide scheinen vertauscht")
+    with pytest.raises(MeasurementError) as refused:
+        make_campaign(tables, guess(tables))
+    assert SWAPPED in str(refused.value)
+    assert page_fault(str(refused.value), "en")[1].endswith("in the form below")
+    assert page_fault(str(refused.value), "de")[1].endswith("ihre Einheiten angeben")
+
+
+def test_taps_as_they_are_do_not_look_swapped(tmp_path: Path) -> None:
+    tables = tap_files(tmp_path, is_swapped=False, moves_m=2e-3)
+    assert SWAPPED not in make_campaign(tables, guess(tables)).notes
+
+
+def test_taps_of_which_none_can_be_used_are_refused_in_german(tmp_path: Path) -> None:
+    tables = tap_files(tmp_path, is_swapped=False, moves_m=0.0)
+    with pytest.raises(MeasurementError, match="the part never slides") as refused:
+        make_campaign(tables, guess(tables))
+    language, said = page_fault(str(refused.value), "de")
+    assert language == "de"
+    assert said.endswith("m und federt zurück (Vorgleiten); stärker stoßen (und so in allen 3 Stößen)")
+    assert page_fault(str(refused.value), "en") == ("en", str(refused.value))

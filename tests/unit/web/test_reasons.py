@@ -20,7 +20,7 @@ from impactcell.web.interface import CellNews
 from impactcell.web.texts.import_notes import page_note
 from impactcell.web.texts.reasons import german_reason
 from tests.snapshots import make_capture, make_snapshot
-from tests.unit.measurements.records import taps, write_logger_file
+from tests.unit.measurements.records import sampled, taps, write_logger_file
 from tests.unit.prediction.test_estimate import GOOD, MODEL
 
 PACKAGE = Path(impactcell.__file__).parent
@@ -128,6 +128,39 @@ def test_what_import_notes_of_taps_is_said_in_german(tmp_path: Path) -> None:
     assert {language for language, _ in said} == {"de"}, said
     assert ("de", "die Zeilen neben den Spalten sagen: Masse 18,9 kg, Geschwindigkeit 3000 mm/min") in said
     assert not any("--" in page_note(note, language)[1] for note in notes for language in ("en", "de"))
+
+
+def test_what_import_notes_of_faulty_data_is_said_in_german(tmp_path: Path) -> None:
+    """A late channel, and what is given and not used, were English on the German page."""
+    rng = np.random.default_rng(2)
+    for number, tap in enumerate(taps((2000, 3000, 4000), (18.9,))):
+        time, force, position = sampled(tap, rng)
+        late = np.interp(time - 1e-3, time, position)
+        rows = [f"{t:.5f},{f:.3f},{x:.8f}" for t, f, x in zip(time, force, late, strict=True)]
+        head = (
+            f"mass: 18.9 kg\nvelocity: {6e4 * tap.velocity_m_s:g} mm/min\n\ntime [s],force [N],position [m]"
+        )
+        (tmp_path / f"tap{number}.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
+    tables = [table for file in sorted(tmp_path.iterdir()) for table in read_tables(file)]
+    said = [page_note(note, "de") for note in make_campaign(tables, guess(tables)).notes]
+    assert {language for language, _ in said} == {"de"}, said
+    assert any("Position ist 1 ms später aufgezeichnet als Kraft" in note for _, note in said), said
+    assert not any(note.endswith(".") for _, note in said), "the page ends each"
+
+
+@pytest.mark.parametrize(
+    ("english", "german"),
+    [
+        ("given", "angegeben"),
+        ("counts the rows", "zählt die Zeilen"),
+        (
+            "given, and not used, for it is of taps: stroke, trigger (--excitation tap says otherwise)",
+            "angegeben und nicht verwendet, weil es nur für Stöße gilt: Hub, Kraft bei Berührung",
+        ),
+    ],
+)
+def test_what_was_given_is_said_in_german(english: str, german: str) -> None:
+    assert page_note(english, "de") == ("de", german)
 
 
 SAID_BY = (
