@@ -69,6 +69,10 @@ def load_effect(file: Path) -> Effect:
         specification.loader.exec_module(module)
     except SyntaxError as error:
         raise PhysicsError(f"{file}:{error.lineno}: {error.msg}") from error
+    except SystemExit as error:
+        raise PhysicsError(
+            f"{file}{_line(error, file)}: ends the program as it is read; take `exit` out of it"
+        ) from error
     except Exception as error:
         raise PhysicsError(f"{file}{_line(error, file)}: {type(error).__name__}: {error}") from error
     return _checked(getattr(module, "EFFECT", None), str(file), file.stem)
@@ -167,7 +171,7 @@ def offer_installed() -> tuple[str, ...]:
             if LIBRARY.get(effect.identifier) is not effect:
                 offer_effect(effect)
             identifiers.append(effect.identifier)
-        except Exception as error:  # noqa: BLE001 - somebody else's code may raise anything
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - somebody else's code may raise anything
             faults.append(f"{place}: {error}; mend it, or pip uninstall {owner}")
     if faults:
         raise PhysicsError("\n".join(faults))
@@ -182,7 +186,7 @@ def _checked(effect: object, place: str, name: str) -> Effect:
     return effect
 
 
-def _line(error: Exception, file: Path) -> str:
+def _line(error: BaseException, file: Path) -> str:
     """Line of the file in which an error arose, as `:12`; empty where it is elsewhere."""
     trace, line = error.__traceback__, ""
     while trace is not None:

@@ -191,6 +191,14 @@ def test_another_process_is_given_the_text(own: Path) -> None:
     assert offered_texts() == texts
 
 
+def test_a_file_that_ends_the_program_is_a_fault(own: Path) -> None:
+    """A script that calls `exit` ended the check with code 0, and without a word."""
+    own.write_text(f"{OWN}\nraise SystemExit(0)\n", encoding="utf-8")
+    with pytest.raises(PhysicsError, match=r"own_pull\.py:\d+: ends the program as it is read"):
+        load_effect(own)
+    assert "own_pull" not in LIBRARY
+
+
 def test_no_traceback_reaches_the_user(own: Path) -> None:
     own.write_text(OWN.replace("return p[0]", "return str(p)"), encoding="utf-8")
     done = subprocess.run(
