@@ -39,6 +39,7 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
     """
     cell_config = read_cell(cell)
     model, own_taps = _judged(cell_config, read_model(extended), anyway=anyway)
+    is_new = in_place_of(cell_config.model, model) != cell_config.model
     previous = put_into_service(cell_config, model)
     for finding in judge_cell(read_cell(cell)):
         if finding.is_fault:
@@ -50,7 +51,8 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
             "previous": str(previous),
             "own_taps": None if own_taps is None else own_taps.content,
         },
-        f"{cell_config.name} runs with model {model.name} from the next cycle on; before: {previous}"
+        f"{cell_config.name} runs with model {model.name} "
+        + (f"from the next cycle on; before: {previous}" if is_new else "already; nothing was changed")
         + ("" if own_taps is None else f"\n{own_taps.sentence}"),
         as_json=as_json,
     )
@@ -76,18 +78,22 @@ def _judged(config: CellConfig, extended: Model, *, anyway: bool) -> tuple[Model
 def put_into_service(config: CellConfig, model: Model) -> Path:
     """Write a model in the place of the cell's own, and return where that is kept from now on.
 
+    Where it is the cell's own already nothing is written: the way back to the one before stays open.
+
     Raises
     ------
     SettingsError
         A file cannot be written.
     """
     target = config.settings.model
-    previous = previous_model(target)
+    previous, taking = previous_model(target), in_place_of(config.model, model)
+    if taking == config.model:
+        return previous
     try:
         previous.write_bytes(target.read_bytes())
     except OSError as error:
         raise SettingsError(f"{previous}: cannot be written: {error.strerror}") from error
-    write_model(in_place_of(config.model, model), target)
+    write_model(taking, target)
     return previous
 
 

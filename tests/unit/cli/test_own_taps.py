@@ -15,7 +15,7 @@ from impactcell.errors import PredictionError, SettingsError
 from impactcell.journal.store import Journal
 from impactcell.prediction import Model
 from impactcell.settings import read_cell
-from impactcell.settings.model_file import write_model
+from impactcell.settings.model_file import read_model, write_model
 from tests.integration.processes import CONFIG
 from tests.snapshots import make_snapshot
 from tests.taps import Tap
@@ -98,6 +98,10 @@ def test_a_model_of_another_plant_is_put_into_service_only_if_that_is_meant(
     assert told["taps"] == 12
     assert told["gap_after"] > 1.5 * told["gap_before"]
     assert read_cell(cell).model.name == "in oil"
+    with pytest.raises(SystemExit):
+        run_verb(["model", "accept", str(cell), str(other)])
+    assert "runs with model in oil already; nothing was changed" in capsys.readouterr().out
+    assert read_model(previous_model(read_cell(cell).settings.model)) == before, "no way back is left"
 
 
 def test_a_dry_run_refuses_what_would_be_refused_and_tells_what_would_change(
