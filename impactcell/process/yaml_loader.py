@@ -6,6 +6,7 @@ PyYAML alone follows 1.1, where each of these surprises.
 
 import difflib
 import itertools
+import re
 import types
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
@@ -30,6 +31,8 @@ MOST_NODES = 200_000
 """A file of nested aliases or merges can describe more than memory holds; no honest one comes near this."""
 
 
+DECIMAL_POINT: Final = "decimals have a point, not a comma"
+"""Way out of `1,5`, which is a text, or within braces a 1 and a key 5."""
 _WAYS_OUT: Final = {
     "found character '\\t' that cannot start any token": "a tab; YAML is indented with spaces",
     "mapping values are not allowed here": (
@@ -101,7 +104,7 @@ def load(path: Path) -> tuple[object, Positions]:
     except OSError as fault:
         raise SettingsError(f"{path}: cannot be read: {fault.strerror}") from fault
     except UnicodeDecodeError as fault:
-        raise SettingsError(f"{path}: is not UTF-8 text (byte {fault.start})") from fault
+        raise SettingsError(f"{path}: is not UTF-8 text (byte {fault.start}); save it as UTF-8") from fault
     try:
         loader = CoreLoader(text)
         try:
@@ -233,11 +236,15 @@ def _explain(
     text = details["msg"].removeprefix("Value error, ").removeprefix("Input ")
     name = _dotted(positions.existing_path(location))
     input_value = details.get("input")
+    if kind == "invalid_key" and isinstance(input_value, int):
+        return positions.value(location), f"{name}: {input_value} stands where a key should; {DECIMAL_POINT}"
     if kind in ("model_type", "dict_type"):
         text = "should be keys with values (`key: value`)"
         text += ", not a list" if isinstance(input_value, list) else ""
     if kind != "value_error" and isinstance(input_value, str | int | float | bool | None):
         text += f", not {'empty' if input_value is None else repr(input_value)}"
+    if isinstance(input_value, str) and re.fullmatch(r"[+-]?\d*,\d+", input_value):
+        text += f"; {DECIMAL_POINT}: {input_value.replace(',', '.')}"
     return positions.value(location), f"{name}: {text}" if name else text
 
 

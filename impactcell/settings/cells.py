@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 from urllib.parse import urlsplit
 
 from impactcell.errors import MapError, SettingsError
@@ -11,6 +12,9 @@ from impactcell.prediction.model import Model
 from impactcell.process import yaml_loader
 from impactcell.settings.model_file import read_model
 from impactcell.settings.sections import CellSettings
+
+EVERY_HOST: Final = ("0.0.0.0", "::")  # noqa: S104 - compared with, not listened on
+"""Hosts that stand for all addresses of the machine."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,6 +118,32 @@ def _port(cell: CellConfig) -> int | None:
     return urlsplit(cell.settings.opcua.endpoint).port or None
 
 
+def _listeners(cell: CellConfig) -> dict[str, tuple[str, int]]:
+    """Host and port of all that a cell has listening, by the key that says so."""
+    settings = cell.settings
+    addresses = {"opcua.endpoint": settings.opcua.endpoint}
+    if settings.web is not None:
+        addresses["web.endpoint"] = settings.web.endpoint
+    parts = {key: urlsplit(address) for key, address in addresses.items()}
+    listeners = {key: (part.hostname or "", part.port or 0) for key, part in parts.items()}
+    if settings.monitoring is not None:
+        listeners["monitoring.port"] = (settings.monitoring.host, settings.monitoring.port)
+    return listeners
+
+
+def _port_faults(cell: CellConfig, other: CellConfig) -> list[str]:
+    """Say which two kinds of listeners would be at the same port; port 0 is any that is free."""
+    faults = []
+    whose = "" if cell is other else f" of {other.path}"
+    for key, (host, port) in _listeners(cell).items():
+        for other_key, (other_host, other_port) in _listeners(other).items():
+            is_told = key == other_key or (cell is other and key > other_key)
+            meet = host == other_host or not {host, other_host}.isdisjoint(EVERY_HOST)
+            if port and port == other_port and meet and not is_told:
+                faults.append(f"{cell.path}: {key} and {other_key}{whose} are both port {port}; change one")
+    return faults
+
+
 def _endpoint(cell: CellConfig) -> tuple[str, int]:
     """Where the module is; cells of one endpoint share its connection."""
     module = cell.settings.module
@@ -172,7 +202,12 @@ def read_cells(paths: Sequence[Path]) -> tuple[CellConfig, ...]:
         except SettingsError as error:
             faults.append(str(error))
     for index, cell in enumerate(cells):
+        faults += _port_faults(cell, cell)
         for other in cells[:index]:
+            if cell.path.resolve() == other.path.resolve():
+                faults.append(f"{cell.path}: is given twice; name it once")
+                continue
+            faults += _port_faults(cell, other)
             if cell.name == other.name:
                 faults.append(f"{cell.path}: cell '{cell.name}' is in {other.path} too; rename one")
             if _acknowledgement_target(cell) == _acknowledgement_target(other):

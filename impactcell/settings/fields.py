@@ -113,7 +113,9 @@ def _is_host(value: str) -> bool:
 def cell_name(value: str) -> str:
     """See that a name can be part of NodeIds, files and addresses."""
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", value):
-        raise ValueError("a cell's name has up to 64 letters, digits, '_', '-' or '.', as in press-1")
+        raise ValueError(
+            "a cell's name has up to 64 letters (a to z), digits, '_', '-' or '.', as in press-1"
+        )
     return value
 
 

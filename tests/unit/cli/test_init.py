@@ -67,7 +67,9 @@ def begun(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("name", ["press 1", "a/b", "../press", "", "Preß"])
 def test_a_name_that_is_none_is_refused_and_nothing_is_written(tmp_path: Path, name: str) -> None:
-    with pytest.raises(SettingsError, match=r"up to 64 letters, digits, '_', '-' or '\.', as in press-1"):
+    with pytest.raises(
+        SettingsError, match=r"up to 64 letters \(a to z\), digits, '_', '-' or '\.', as in press-1"
+    ):
         run_verb(["init", str(tmp_path / "own"), *ANSWERS, "--name", name])
     assert not (tmp_path / "own").exists()
 

@@ -142,7 +142,7 @@ def test_a_missing_file_a_directory_and_bytes_are_named(tmp_path: Path) -> None:
     with pytest.raises(SettingsError, match="cannot be read: Is a directory"):
         load(tmp_path)
     (tmp_path / "b.yaml").write_bytes(b"a: \xff\n")
-    with pytest.raises(SettingsError, match="is not UTF-8 text"):
+    with pytest.raises(SettingsError, match=r"is not UTF-8 text \(byte \d+\); save it as UTF-8"):
         load(tmp_path / "b.yaml")
 
 

@@ -1,6 +1,7 @@
 """A cell file is understood whole, or every fault of it is told at once, with its place."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -72,6 +73,13 @@ def test_a_name_or_an_address_is_a_host(config: Path, host: str) -> None:
         ("host: 127.0.0.1", "host: the module", "write it as in `host: 10.0.0.5`"),
         ("host: 127.0.0.1", "host: 10.0.0.256", "write it as in `host: 10.0.0.5`"),
         ("host: 127.0.0.1", "host: ''", "write it as in `host: 10.0.0.5`"),
+        ("wear_limit: 0.25", "wear_limit: 0,25", "not '0,25'; decimals have a point, not a comma: 0.25"),
+        (
+            "  stroke_mm: 1.5",
+            "  {stroke_mm: 1,5}",
+            "5 stands where a key should; decimals have a point, not a comma",
+        ),
+        ("cell: prototype", "cell: prüfstand", r"letters \(a to z\)"),
         ("port: 15020", "port: 70000", "less than or equal to 65535"),
         ("wear_limit: 0.25", "wear_limit: .nan", "finite"),
         ("wear_limit: 0.25", "wear_limit: 0.2\n  wear_limit: 0.3", "twice"),
@@ -142,9 +150,41 @@ def test_cells_of_one_process_do_not_share_what_is_one_cells(config: Path) -> No
     assert "same journal file" in str(caught.value)
     assert "same module and register map" in str(caught.value)
     assert "same endpoint" in str(caught.value)
-    with pytest.raises(SettingsError, match="rename one"):
+    namesake = edited(config, "port: 15020", "port: 15021", "namesake")
+    with pytest.raises(SettingsError, match=r"cell 'prototype' is in .*first.yaml too; rename one"):
+        read_cells([first, namesake])
+    with pytest.raises(SettingsError, match=r"first.yaml: is given twice; name it once$"):
         read_cells([first, first])
     assert [cell.name for cell in read_cells([first])] == ["prototype"]
+
+
+@pytest.mark.parametrize(
+    ("sections", "told"),
+    [
+        ("monitoring: {port: 8480}", "monitoring.port and web.endpoint are both port 8480; change one"),
+        ("monitoring: {port: 4840, host: 0.0.0.0}", "monitoring.port and opcua.endpoint are both port 4840"),
+        (
+            "web: {endpoint: 'http://127.0.0.1:4840'}",
+            "opcua.endpoint and web.endpoint are both port 4840; change one",
+        ),
+    ],
+)
+def test_two_listeners_at_one_port(config: Path, sections: str, told: str) -> None:
+    """`check` found such a cell in order; `run` said that the port was taken, by the same cell."""
+    path = edited(config, "wear_limit: 0.25", f"wear_limit: 0.25\n{sections}")
+    with pytest.raises(SettingsError, match=re.escape(told)):
+        read_cells([path])
+    read_cells([edited(config, "wear_limit: 0.25", "wear_limit: 0.25\nmonitoring: {port: 0}", "any")])
+
+
+def test_listeners_of_two_cells_at_one_port(config: Path) -> None:
+    first = edited(config, "wear_limit: 0.25", "wear_limit: 0.25\nmonitoring: {port: 8481}", "first")
+    other = "wear_limit: 0.25\nweb: {endpoint: 'http://127.0.0.1:8481'}"
+    second = edited(config, "wear_limit: 0.25", other, "second")
+    with pytest.raises(
+        SettingsError, match=r"web.endpoint and monitoring.port of .*first.yaml are both port 8481"
+    ):
+        read_cells([first, second])
 
 
 def test_word_order_of_the_cell_takes_the_place_of_the_maps(config: Path) -> None:
