@@ -193,6 +193,8 @@ async def test_an_alarm_that_is_held_back_says_why_and_has_not_been(tmp_path: Pa
     store(tmp_path / "j.sqlite", [10**18], {1: "A"}, (at_rest, replace(at_rest, suppressed=False)))
     async with make_page(tmp_path, tmp_path / "j.sqlite").logged_in(Role.OBSERVER) as client:
         history = (await client.get("/alarms?lang=en")).text.partition("<tbody>")[2]
+        text = (await client.get("/alarms/history.csv")).content.decode("utf-8-sig")
+    assert [row["suppressed"] for row in csv.DictReader(io.StringIO(text))] == ["0", "1"]
     assert history.count("suppressed</span>") == 1
     assert "Not watched: the batch or the model is new" in history
     assert "Watched again." in history
