@@ -18,7 +18,7 @@ from impactcell.cell import PROVISIONAL
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.first_model import say_first_model
 from impactcell.cli.paths import check_directory
-from impactcell.errors import SettingsError
+from impactcell.errors import PredictionError, SettingsError
 from impactcell.features import noise_std
 from impactcell.physics import Plant
 from impactcell.prediction import Model
@@ -29,6 +29,7 @@ from impactcell.settings import read_cell
 from impactcell.settings.fields import cell_name, module_host
 from impactcell.settings.judgement import judge_cell
 from impactcell.settings.model_file import write_model
+from impactcell.settings.plausible_tap import FRICTION, MASS, STROKE, VELOCITY
 
 PROVISIONAL_STIFFNESS: Final = 6.5e5
 """k of the paper's prototype, N/m: a beginning where nothing was measured."""
@@ -140,11 +141,12 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
             fit_first_model(taps, answers.name, campaign.name),
             _with_measured_noise(answers, taps),
         )
+    text = TOP + yaml.safe_dump(_cell(answers, target_map), sort_keys=False)
     try:
         directory.mkdir(parents=True, exist_ok=True)
         if not has_map:
             shutil.copyfile(source, target_map)
-        cell.write_text(TOP + yaml.safe_dump(_cell(answers, target_map), sort_keys=False), encoding="utf-8")
+        cell.write_text(text, encoding="utf-8")
     except OSError as error:
         raise SettingsError(f"{error.filename or directory}: cannot be written: {error.strerror}") from error
     try:
@@ -155,9 +157,11 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
         )
         write_model(calibrated_model(config), model)
         findings = judge_cell(read_cell(cell))
-    except Exception:
+    except Exception as error:
         for begun in (cell, model, *([] if has_map else [target_map])):
             begun.unlink(missing_ok=True)  # what was not begun whole is not begun
+        if isinstance(error, PredictionError) and (doubts := _doubts(answers)):
+            raise PredictionError("; ".join([str(error), *doubts])) from error
         raise
     for finding in findings:
         print_note(str(finding))
@@ -210,11 +214,22 @@ def _map_file(name: str) -> Path:
     raise SettingsError(f"there is no register map {name}; name a file, or one of {known}")
 
 
+def _doubts(answers: Answers) -> list[str]:
+    """Say which answers are hardly meant, and in which unit they would be."""
+    said = (
+        ("mass-kg", MASS, answers.mass_kg),
+        ("stroke-mm", STROKE, answers.stroke_mm),
+        ("max-velocity-mm-per-min", VELOCITY, answers.max_velocity_mm_per_min),
+        ("wear-limit", FRICTION, answers.wear_limit),
+    )
+    return [f"--{option}: {doubt}" for option, plausible, value in said if (doubt := plausible.doubt(value))]
+
+
 def _cell(answers: Answers, target_map: Path) -> dict[str, Any]:
-    if not all(
-        math.isfinite(v) and v > 0.0 for v in (answers.mass_kg, answers.stroke_mm, answers.wear_limit)
-    ):
-        raise SettingsError("mass, stroke and wear limit have to be above 0")
+    for option in ("mass_kg", "stroke_mm", "wear_limit"):
+        value = getattr(answers, option)
+        if not (math.isfinite(value) and value > 0.0):
+            raise SettingsError(f"--{option.replace('_', '-')} {value:g}: has to be above 0")
     noise = {"force_noise_std_n": answers.force_noise_n, "position_noise_std_um": answers.position_noise_um}
     if not all(math.isfinite(std) and std >= 0.0 for std in noise.values()):
         raise SettingsError("the noise of a sensor has to be above 0; leave it out, or say 0, if not known")

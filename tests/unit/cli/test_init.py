@@ -74,6 +74,33 @@ def test_a_name_that_is_none_is_refused_and_nothing_is_written(tmp_path: Path, n
     assert not (tmp_path / "own").exists()
 
 
+@pytest.mark.parametrize(("option", "value"), [("--mass-kg", "-4.2"), ("--wear-limit", "0")])
+def test_an_answer_that_is_not_above_0_is_named_and_nothing_is_written(
+    tmp_path: Path, option: str, value: str
+) -> None:
+    """The register map was left in the directory."""
+    with pytest.raises(SettingsError, match=rf"{option} {value}: has to be above 0"):
+        run_verb(["init", str(tmp_path / "own"), *ANSWERS, option, value])
+    assert not (tmp_path / "own").exists()
+
+
+def test_a_part_that_does_not_slide_for_an_answer_in_another_unit_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A wear limit of 25 for 25 % made the way out a tap of 28000 mm/min."""
+
+    def refuse(_: object) -> None:
+        raise PredictionError("no part slides free")
+
+    monkeypatch.setattr("impactcell.cli.init.calibrated_model", refuse)
+    told = r"no part slides free; --wear-limit: a friction .* of 25 .*: if that was meant in %, write 0.25$"
+    with pytest.raises(PredictionError, match=told):
+        run_verb(["init", str(tmp_path / "own"), *ANSWERS, "--wear-limit", "25"])
+    with pytest.raises(PredictionError, match=r"no part slides free$"):
+        run_verb(["init", str(tmp_path / "own"), *ANSWERS])
+    assert list((tmp_path / "own").iterdir()) == []
+
+
 def test_a_cell_from_nothing_can_be_read_and_says_what_to_do(
     begun: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
