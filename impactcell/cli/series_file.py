@@ -15,6 +15,8 @@ from impactcell.tracking.wear_batch import FrictionObservation
 
 COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch")
 """What is read; the first two have to be there."""
+SHOT = "shot"
+"""What `impactcell estimate` calls a cycle of a campaign."""
 FIRST_LINE = "cycle,mu_s,mu_s_std[,batch]"
 """In words."""
 DELIMITERS = (",", ";", "\t", "|")
@@ -102,6 +104,8 @@ def _header(place: str, line: str) -> tuple[str, list[str]]:
         names = split_cells(line, delimiter)
         splits.append((delimiter, [name.lower() if name.lower() in COLUMNS else name for name in names]))
     delimiter, header = max(splits, key=lambda split: len(set(COLUMNS) & set(split[1])))
+    if "cycle" not in header:
+        header = ["cycle" if name.lower() == SHOT else name for name in header]
     for name in COLUMNS[:2]:
         if name not in header:
             raise SeriesError(f"{place}: no column `{name}`; the first line is to be {FIRST_LINE}")

@@ -81,6 +81,7 @@ class MethodService:
             result.InputArgumentResults = _check_arguments(method, arguments)
             if any(not code.is_good() for code in result.InputArgumentResults):
                 result.StatusCode = ua.StatusCode(ua.StatusCodes.BadInvalidArgument)
+                reason = _of_other_types(method, arguments, result.InputArgumentResults)
             else:
                 await method.handler(context, [argument.Value for argument in arguments])
         except StatusCodeError as fault:
@@ -88,6 +89,7 @@ class MethodService:
         except InvalidArgumentError as error:
             result.InputArgumentResults[error.index] = ua.StatusCode(error.code)
             result.StatusCode = ua.StatusCode(ua.StatusCodes.BadInvalidArgument)
+            reason = f"{method.arguments[error.index].name}: {error}"
         except RefusedError as refused:
             result.StatusCode, reason = status_of(refused), str(refused)
         self._audit.method_called(context.actor, request, result.StatusCode.value, reason)
@@ -125,3 +127,13 @@ def _check_arguments(method: Method, arguments: list[ua.Variant]) -> list[ua.Sta
         fits = fits or (nullable and argument.VariantType == ua.VariantType.Null)
         results.append(ua.StatusCode(ua.StatusCodes.Good if fits else ua.StatusCodes.BadTypeMismatch))
     return results
+
+
+def _of_other_types(method: Method, arguments: list[ua.Variant], results: list[ua.StatusCode]) -> str:
+    """Say which arguments are of another type than they should be."""
+    told = []
+    for declared, argument, code in zip(method.arguments, arguments, results, strict=True):
+        if not code.is_good():
+            given = f"{argument.VariantType.name}{'[]' if isinstance(argument.Value, list) else ''}"
+            told.append(f"{declared.name} is a {given}, not a {declared.kind.name}")
+    return "; ".join(told)

@@ -69,7 +69,8 @@ class MethodAudit:
         if len(given) > MAX_ARGUMENTS:
             arguments += f", {len(given) - MAX_ARGUMENTS} more"
         code = ua.StatusCode(status)
-        _log_outcome(actor, f"{name}({arguments})", "" if code.is_good() else f"{code.name} {reason}")
+        refusal = code.name if reason in ("", code.name) else f"{code.name} {reason}"
+        _log_outcome(actor, f"{name}({arguments})", "" if code.is_good() else refusal)
 
 
 def _written(value: Any) -> str:

@@ -192,6 +192,17 @@ def test_a_file_as_people_have_it_says_the_same(tmp_path, capsys, written, encod
     assert run(capsys, path) == expected
 
 
+def test_shots_of_a_campaign_are_cycles(tmp_path, capsys):
+    """`impactcell estimate` writes them so."""
+    path = write(tmp_path / "s.csv", truth(60, at=0))
+    expected = run(capsys, path)
+    path.write_text(path.read_text().replace("cycle,", "Shot,", 1))
+    assert run(capsys, path) == expected
+    path.write_text(path.read_text().replace("Shot,mu_s,", "shot,cycle,mu_s,", 1))
+    with pytest.raises(SeriesError, match=r"s\.csv:2: 3 cells, but the header has 4"):
+        track(path)
+
+
 def test_columns_that_are_not_read_are_told(tmp_path, capsys):
     path = write(tmp_path / "s.csv", truth(60, at=0))
     path.write_text(path.read_text().replace("mu_s_std", "mu_s_sd"))
