@@ -7,6 +7,7 @@ from typing import Final
 from impactcell.records import (
     FORCE_SCALE_STD,
     MASS_STD,
+    POSITION_SCALE_STD,
     VELOCITY_STD,
     BatchAnnouncement,
     Capture,
@@ -33,14 +34,19 @@ class CaptureDefaults:
     force_noise_std_n, position_noise_std_m : float
         Of the sensors.
     recorder_std : tuple of float
-        Relative standard deviations of mass, velocity and the scale of the force; 0 where they are exact.
+        Relative standard deviations of mass, velocity and the scales of force and position; 0 where exact.
     """
 
     mass_kg: float | None = None
     stroke_m: float | None = None
     force_noise_std_n: float = 0.4
     position_noise_std_m: float = 1.5e-6
-    recorder_std: tuple[float, float, float] = (MASS_STD, VELOCITY_STD, FORCE_SCALE_STD)
+    recorder_std: tuple[float, float, float, float] = (
+        MASS_STD,
+        VELOCITY_STD,
+        FORCE_SCALE_STD,
+        POSITION_SCALE_STD,
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,6 @@
 """Least squares of all taps of a campaign: what they share, and what each has of its own, eliminated.
 
-Shared are mu_k/mu_s, k and b, and how far mass, velocity and the force's scale are off in all taps alike.
+Shared are mu_k/mu_s, k and b, and how far mass, velocity and the sensors' scales are off in all taps alike.
 """
 
 from collections.abc import Sequence
@@ -24,19 +24,19 @@ from impactcell.prediction.linearised_model import (
 )
 from impactcell.records import Samples
 
-COMMON = np.arange(WITH_RECORDER, WITH_RECORDER + 3)
-"""Places, behind a tap's theta, of what all taps have in common of mass, velocity and scale of the force."""
+COMMON = np.arange(WITH_RECORDER, WITH_RECORDER + 4)
+"""Places, behind a tap's theta, of what all taps have in common of mass, velocity and scales."""
 SHARED = np.array([RATIO, STIFFNESS, DAMPING, *COMMON])
 """Parameters that all taps share: mu_k/mu_s, k and b, and these."""
-OF_A_TAP = np.array([1.0, 0.2, 0.2, 0.02])
-"""How far contact is from t = 0, and mass, velocity and scale of a tap from what all have in common, in
+OF_A_TAP = np.array([1.0, 0.2, 0.2, 0.02, 0.02])
+"""How far contact is from t = 0, and mass, velocity and scales of a tap from what all have in common, in
 standard deviations of what is known: a balance, a drive and a sensor are off alike in all taps."""
 WEIGHT = 1.0 / OF_A_TAP
 PLANT, BESIDE = slice(0, DAMPING - RATIO + 1), slice(DAMPING - RATIO + 1, None)
 """Those of the plant among them, and the others."""
 STOP = StopRule(max_steps=40, length=0.02, cost=0.05, refused_cost=0.1)
 """When the joint fit ends; its cost is of all taps, ten and more."""
-MAX_STEP = np.array([0.3, 0.3, 0.3, 4.0, 4.0, 4.0])
+MAX_STEP = np.array([0.3, 0.3, 0.3, 4.0, 4.0, 4.0, 4.0])
 """Longest step of what is shared: farther away the linear model says nothing."""
 HELD = 1e-6
 """Standard deviation of ln(mu_k/mu_s) that holds it where it is."""
@@ -51,7 +51,7 @@ NO_REST = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CampaignPoint:
-    """Parameters of every tap, shape (n, 11), the linear model of each, and half of their sums of squares."""
+    """Parameters of every tap, shape (n, 13), the linear model of each, and half of their sums of squares."""
 
     theta: Samples
     taps: list[Linearisation]
@@ -158,13 +158,13 @@ class CampaignProblem:
 
 
 def _from_common(theta: Samples) -> tuple[Samples, Samples]:
-    """Contact, mass, velocity and scale of each tap, from what all have in common, and this.
+    """Contact, mass, velocity and scales of each tap, from what all have in common, and this.
 
     Returns
     -------
-    apart : ndarray, shape (n, 4)
+    apart : ndarray, shape (n, 5)
         In standard deviations of each.
-    common : ndarray, shape (3,)
+    common : ndarray, shape (4,)
     """
     common = theta[0, COMMON]
     return (theta[:, PARAMETERS:WITH_RECORDER] - np.append(0.0, common)) * WEIGHT, common

@@ -45,7 +45,8 @@ def tap_input(capture: Capture) -> TapInput:
 
 def recorder_std_of(capture: Capture) -> RecorderStd:
     """Give the standard deviations of what a record does not tell exactly."""
-    return capture.onset_std_s, capture.mass_std, capture.velocity_std, capture.force_scale_std
+    scales = capture.force_scale_std, capture.position_scale_std
+    return capture.onset_std_s, capture.mass_std, capture.velocity_std, *scales
 
 
 def linearised_model(features: Features, plant: Plant) -> LinearisedModel:

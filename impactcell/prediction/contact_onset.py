@@ -26,13 +26,13 @@ def fit_plant_and_onset(
 ) -> tuple[PlantFit, Sequence[Features]]:
     """Fit the plant with each tap's moment of contact: within a step, or farther if that explains the taps.
 
-    Mass, velocity and scale of the force are each tap's own as well, as far as that explains the taps.
+    Mass, velocity and the sensors' scales are each tap's own as well, as far as that explains the taps.
 
     Returns
     -------
     fit : PlantFit
     taps : sequence of Features
-        As they were fitted: their captures say what was known of contact, mass, velocity and scale.
+        As they were fitted: their captures say what was known of contact, mass, velocity and scales.
 
     Raises
     ------

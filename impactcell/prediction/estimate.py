@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from impactcell.errors import NotConvergedError, PredictionError
 from impactcell.features import Fault, Features, MeasuredFeature, SlideFeatures, extract, impulse_balance
 from impactcell.prediction.equations import beyond_calibration, by_distance, by_force, combined, out_of_range
-from impactcell.prediction.linearised_model import FORCE_SCALE, MASS, PARAMETERS, VELOCITY
+from impactcell.prediction.linearised_model import FORCE_SCALE, MASS, PARAMETERS, POSITION_SCALE, VELOCITY
 from impactcell.prediction.mass_interpolation import interpolate_mass
 from impactcell.prediction.model import Model
 from impactcell.prediction.phase_reweighting import MISFIT_THRESHOLD
@@ -18,7 +18,8 @@ NO_FEATURE = MeasuredFeature(math.nan, math.nan)
 SUMMARY_RELATIVE_STD = 0.01
 """Relative standard deviation of what the module reports without one: our choice, for it says nothing."""
 MAX_DEVIATION = 3.0
-"""Standard deviations by which what was told may be off: 3 % of mass and scale, 1.5 % of velocity."""
+"""Standard deviations by which what was told may be off: 3 % of mass and force, 1.5 % of velocity,
+0.9 % of position."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,18 +63,18 @@ def estimate_from_features(features: Features, model: Model, misfit: float = 1.0
     mu_s, estimator = _select_published(capture, equations)
     gap = math.nan
     if force_fault or slide is None:
-        mu_k = _mu_k(model, slide, mu_s, capture.mass_kg)
+        mu_k = _mu_k(model, slide, mu_s, capture)
     else:
         try:
             waveform = fit(features, model)
         except PredictionError as fault:
-            mu_k = _mu_k(model, slide, mu_s, capture.mass_kg)
+            mu_k = _mu_k(model, slide, mu_s, capture)
             mu_s = _with_warnings(mu_s, f"no waveform estimate: {fault}")
             gap = fault.gap if isinstance(fault, NotConvergedError) else math.nan
         else:
             mu_s_seen, mu_k, gap = _from_waveform(model, capture, waveform)
             if max(misfit, waveform.misfit) > MISFIT_THRESHOLD:
-                mu_k = _with_warnings(_mu_k(model, slide, mu_s_seen, capture.mass_kg), mu_k.reason)
+                mu_k = _with_warnings(_mu_k(model, slide, mu_s_seen, capture), mu_k.reason)
             if misfit <= MISFIT_THRESHOLD or mu_s.quality is Quality.BAD:
                 mu_s, estimator = mu_s_seen, Estimator.WAVEFORM
             else:
@@ -145,7 +146,7 @@ def _from_waveform(
 
 
 def _told_otherwise(capture: Capture, waveform: WaveformFit) -> list[str]:
-    """Name the mass, the velocity or the scale of the force that the tap shows, where it is not as told."""
+    """Name the mass, the velocity or the scale that the tap shows, where it is not as told."""
     if len(waveform.theta) == PARAMETERS:
         return []
     off = waveform.theta
@@ -160,6 +161,9 @@ def _told_otherwise(capture: Capture, waveform: WaveformFit) -> list[str]:
     if abs(off[FORCE_SCALE]) > MAX_DEVIATION:
         scale = math.exp(capture.force_scale_std * off[FORCE_SCALE])
         said.append(f"the force is {scale:.3f} times that of the model: check its scale")
+    if abs(off[POSITION_SCALE]) > MAX_DEVIATION:
+        scale = math.exp(capture.position_scale_std * off[POSITION_SCALE])
+        said.append(f"the position is {scale:.3f} times that of the model: check its scale")
     return said
 
 
@@ -242,14 +246,15 @@ def _select_published(capture: Capture, equations: _Equations) -> tuple[Coeffici
     return equations.combined, Estimator.NONE
 
 
-def _mu_k(model: Model, slide: SlideFeatures | None, mu_s: Coefficient, mass_kg: float) -> Coefficient:
+def _mu_k(model: Model, slide: SlideFeatures | None, mu_s: Coefficient, capture: Capture) -> Coefficient:
     """mu_k from the mean deceleration of the slide, or, without one, from mu_s through the ratio.
 
     A slide knows nothing of what a model lacks in the contact, where a waveform bends mu_k by a third for
-    0.1 ms of delay. What friction does along the slide widens its standard deviation.
+    0.1 ms of delay. What friction does along the slide and the position's scale widen its std.
     """
-    if slide is not None and (value := deceleration_friction(model, mass_kg, slide)) > 0.0:
-        std = math.hypot(slide.deceleration.std, slide.bend) / model.plant.gravity_m_s2
+    if slide is not None and (value := deceleration_friction(model, capture.mass_kg, slide)) > 0.0:
+        noise = math.hypot(slide.deceleration.std, slide.bend) / model.plant.gravity_m_s2
+        std = math.hypot(noise, capture.position_scale_std * value)
         return Coefficient(value, std, Quality.UNCERTAIN, "from the mean deceleration of the slide")
     if mu_s.quality < Quality.BAD:
         ratio = model.ratio

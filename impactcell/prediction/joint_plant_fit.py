@@ -2,7 +2,7 @@
 
 Least squares on the waveforms of all taps. Each tap's own numbers are eliminated from the normal equations,
 so the cost grows with the number of taps, not with its cube: its mu_k and, of a tap that was measured, its
-first contact, mass, velocity and scale of the force. With those half a sampling step or 0.1 % off no plant
+first contact, mass, velocity and the sensors' scales. With those half a sampling step or 0.1 % off no plant
 explains a tap.
 """
 
@@ -46,10 +46,10 @@ MIN_MU_K = 1e-3
 """mu_k at which a fit starts at least: its logarithm is fitted."""
 INITIAL_RATIO = 0.76
 """mu_k/mu_s from which a fit starts: that with which the paper's coefficients come back (own fit of them)."""
-WEAK_STD = np.array([0.3, 1.0, 1.0, 1.0, 1.0, 1.0])
+WEAK_STD = np.array([0.3, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
 """Standard deviations of what is shared about the start: of ln(mu_k/mu_s, k, b) they only hold what no tap
 shows."""
-CONTACT_STD = np.array([0.3, 3e-4, 2e-3, 1.0, 1.0, 1.0])
+CONTACT_STD = np.array([0.3, 3e-4, 2e-3, 1.0, 1.0, 1.0, 1.0])
 """The same where k and b of the contact alone are believed more than the model of the whole tap."""
 MIN_RATIO_STD = 1e-3
 """Least standard deviation of mu_k/mu_s from tap to tap that a prior is given. Our choice."""

@@ -2,9 +2,9 @@
 
 theta = ln(mu_k, mu_k / mu_s, k, b), with stiffness k [N/m] and damping b [N s/m] of the contact. Steps in it
 are relative, whatever the units. Of a tap that was measured, theta has what nobody knows exactly as well, in
-standard deviations from what is known of it: the moment of first contact, ln m, ln v and the logarithm of the
-force sensor's scale. z (`kink_coordinate`) says whether the part sticks before it moves; at z = 0 (the kink)
-the response to theta has a bend.
+standard deviations from what is known of it: the moment of first contact, ln m, ln v and the logarithms of
+the scales of force and position. z (`kink_coordinate`) says whether the part sticks before it moves; at z = 0
+(the kink) the response to theta has a bend.
 """
 
 import math
@@ -19,15 +19,18 @@ from impactcell.prediction.block_averaging import BlockMeans
 from impactcell.prediction.block_residuals import linearise_blocks, sample_squares
 from impactcell.records import Samples
 
-MU_K, RATIO, STIFFNESS, DAMPING, ONSET, MASS, VELOCITY, FORCE_SCALE = range(8)
+MU_K, RATIO, STIFFNESS, DAMPING, ONSET, MASS, VELOCITY, FORCE_SCALE, POSITION_SCALE = range(9)
 """Places in theta."""
-PARAMETERS, WITH_RECORDER = 4, 8
+PARAMETERS, WITH_RECORDER = 4, 9
 """Length of theta without what nobody knows of a record exactly, and with it."""
-RecorderStd = tuple[float, float, float, float]
-"""Standard deviations of first contact [s], and relative ones of mass, velocity and the force's scale."""
+RecorderStd = tuple[float, float, float, float, float]
+"""Standard deviations of first contact [s], and relative ones of mass, velocity and the scales of force and
+position."""
+EXACT: RecorderStd = (0.0, 0.0, 0.0, 0.0, 0.0)
+"""Of a record that tells all of these."""
 JUST_STICKING = 1e-7
 """z above which the model is that of a part that sticks first (see above)."""
-STEP_SENSES = np.array([1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0])
+STEP_SENSES = np.array([1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0])
 """Senses of small steps in theta that do not make a part slip that sticks."""
 RELATIVE_STEP = 1e-5
 """Step of a difference in theta: small against the noise, large against rounding. Our choice."""
@@ -35,11 +38,11 @@ RECORDER_STEP = 1e-3
 """The same of what is known of a record only so well, in its standard deviations. Our choice."""
 LATEST_ONSET = 2.0
 """How far from t = 0 first contact may lie, in its standard deviations: a sampling step."""
-FARTHEST = np.array([LATEST_ONSET, 10.0, 10.0, 10.0])
+FARTHEST = np.array([LATEST_ONSET, 10.0, 10.0, 10.0, 10.0])
 """How far what is known of a record only so well may lie from that, in standard deviations."""
 STEPS_OUT = STEP_SENSES * np.repeat([RELATIVE_STEP, RECORDER_STEP], [PARAMETERS, WITH_RECORDER - PARAMETERS])
 STEPS = np.vstack([np.zeros(WITH_RECORDER), np.diag(STEPS_OUT)])
-"""Of theta, in each of the copies of a tap, shape (9, 8); the last is integrated with the first."""
+"""Of theta, in each of the copies of a tap, shape (10, 9); the last two are integrated with the first."""
 
 
 def parameter_count(recorder_std: RecorderStd) -> int:
@@ -114,14 +117,14 @@ class LinearisedModel:
         tap: TapInput,
         force: BlockMeans,
         position: BlockMeans,
-        recorder_std: RecorderStd = (0.0, 0.0, 0.0, 0.0),
+        recorder_std: RecorderStd = EXACT,
         zero_std: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self.tap = tap
         self.recorder_std = np.array(recorder_std)
         self.parameters = parameter_count(recorder_std)
-        _, mass_std, velocity_std, _ = recorder_std
-        kink_form = np.array([1.0, -1.0, 0.0, -1.0, 0.0, mass_std, -velocity_std, 0.0])
+        _, mass_std, velocity_std, *_ = recorder_std
+        kink_form = np.array([1.0, -1.0, 0.0, -1.0, 0.0, mass_std, -velocity_std, 0.0, 0.0])
         self.kink_form = kink_form[: self.parameters]
         self.force_time_s, self.position_time_s = force.time_s, position.time_s
         self.size = len(force.values) + len(position.values)
@@ -264,7 +267,7 @@ class LinearisedModel:
         mass_kg = velocity_m_s = onset_s = None
         slipping = damping * (self.tap.velocity_m_s / self._weight_n)
         if count > PARAMETERS:
-            onset_s, log_mass, log_velocity, _ = (moved[:, PARAMETERS:] * self.recorder_std).T
+            onset_s, log_mass, log_velocity, *_ = (moved[:, PARAMETERS:] * self.recorder_std).T
             mass_kg = self.tap.mass_kg * np.exp(log_mass)
             velocity_m_s = self.tap.velocity_m_s * np.exp(log_velocity)
             slipping = slipping * np.exp(log_velocity - log_mass)
@@ -275,11 +278,15 @@ class LinearisedModel:
         traces = self._ensemble.traces(table, mass_kg=mass_kg, velocity_m_s=velocity_m_s, onset_s=onset_s)
         if count == PARAMETERS:
             return traces.force_n, traces.position_m
-        return self._with_force_scale(traces.force_n, traces.position_m, theta[FORCE_SCALE])
+        return self._with_scales(traces.force_n, traces.position_m, theta[FORCE_SCALE:])
 
-    def _with_force_scale(self, force: Samples, position: Samples, in_stds: float) -> tuple[Samples, Samples]:
-        """Scale the force of all copies, and add the copy in which its scale is stepped."""
-        std = self.recorder_std[FORCE_SCALE - PARAMETERS]
-        force = math.exp(std * in_stds) * force
-        stepped = math.exp(std * RECORDER_STEP) * force[: len(self.force_time_s)]
-        return np.append(force, stepped), np.append(position, position[: len(self.position_time_s)])
+    def _with_scales(self, force: Samples, position: Samples, in_stds: Samples) -> tuple[Samples, Samples]:
+        """Scale force and position of all copies, and add the copies in which either scale is stepped."""
+        stds = self.recorder_std[FORCE_SCALE - PARAMETERS :]
+        scales, steps = np.exp(stds * in_stds).tolist(), np.exp(stds * RECORDER_STEP).tolist()
+        first, place = force[: len(self.force_time_s)], position[: len(self.position_time_s)]
+        force = np.concatenate([force, steps[0] * first, first])
+        position = np.concatenate([position, place, steps[1] * place])
+        force *= scales[0]
+        position *= scales[1]
+        return force, position

@@ -12,6 +12,7 @@ from impactcell.prediction.linearised_model import (
     FARTHEST,
     JUST_STICKING,
     PARAMETERS,
+    POSITION_SCALE,
     RATIO,
     Linearisation,
     LinearisedModel,
@@ -21,8 +22,10 @@ from impactcell.records import Samples
 
 STOP = StopRule(max_steps=50, length=0.02, cost=0.005, refused_cost=0.1)
 """When the fit of one tap ends: an estimate off by 0.02 of its standard deviation is off by nothing."""
-MAX_STEP_STD, MAX_STEP = 4.0, 0.5
-"""Longest step, in standard deviations of the prior and in theta: beyond, the linear model says nothing."""
+MAX_STEP_STD = 4.0
+MAX_STEP = np.append(np.full(POSITION_SCALE, 0.5), MAX_STEP_STD)
+"""Longest step, in standard deviations of the prior and in theta: beyond, the linear model says nothing.
+In the scale of the position it is exact; a step cut off there would leave mu_k without what it follows."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,7 +193,7 @@ class TapProblem:
         step, covariance, length, _ = _solve_step(
             linear.normal, linear.slope, prior.weight, start.theta - prior.mean, 1.0, damping
         )
-        longest = np.minimum(MAX_STEP, MAX_STEP_STD / np.maximum(prior.weight, 1e-12))
+        longest = np.minimum(MAX_STEP[: len(step)], MAX_STEP_STD / np.maximum(prior.weight, 1e-12))
         theta = start.theta + np.minimum(np.maximum(step, -longest), longest)
         farthest = FARTHEST[: len(theta) - PARAMETERS]
         theta[PARAMETERS:] = np.minimum(np.maximum(theta[PARAMETERS:], -farthest), farthest)

@@ -65,10 +65,10 @@ class WaveformFit:
         Posterior means and standard deviations.
     mu_s_common_std, mu_k_common_std : float
         The part of these that taps like this one share: errors of the plant's constants, of mass, velocity
-        and scale as told; first contact is each tap's own.
-    theta : ndarray, shape (4,) or (8,)
+        and scales as told; first contact is each tap's own.
+    theta : ndarray, shape (4,) or (9,)
         Most probable ln(mu_k, mu_k/mu_s, k, b), and of a tap that was measured its first contact, mass,
-        velocity and scale of the force, in standard deviations from what is known of them.
+        velocity and scales of force and position, in standard deviations from what is known of them.
     posterior : Posterior
         Of theta.
     immediate : float

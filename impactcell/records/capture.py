@@ -19,6 +19,9 @@ may lie anywhere within one, and where a soft contact shows is off by as much ag
 MASS_STD, VELOCITY_STD, FORCE_SCALE_STD = 0.01, 0.005, 0.01
 """Relative standard deviations of a mass as it was weighed, a velocity as it was commanded, and a force
 sensor's scale. A tap shows them better than so; taken as exact, 0.1 % of either bends mu_s by up to 18 %."""
+POSITION_SCALE_STD = 0.003
+"""The same of a position sensor's scale, which mu_k follows. Our choice: laser triangulators are linear to
+0.1-0.5 % of the way, and an error anywhere within 0.5 % has this standard deviation."""
 STEPS_LOOKED_AT = 50
 """Samples whose median distance is the sampling step."""
 
@@ -98,8 +101,9 @@ class Capture:
         The module's own figures for this cycle, where it reports them.
     onset_std_s : float
         Standard deviation of the moment of first contact about t = 0 [s]; 0 where the recorder tells it.
-    mass_std, velocity_std, force_scale_std : float
-        Relative standard deviations of `mass_kg`, `velocity_m_s` and the scale of the force; 0 where exact.
+    mass_std, velocity_std, force_scale_std, position_scale_std : float
+        Relative standard deviations of `mass_kg`, `velocity_m_s` and of the scales of force and position; 0
+        where exact.
     """
 
     cycle: int
@@ -121,6 +125,7 @@ class Capture:
     mass_std: float = 0.0
     velocity_std: float = 0.0
     force_scale_std: float = 0.0
+    position_scale_std: float = 0.0
 
     @property
     def halt_s(self) -> float:
@@ -159,8 +164,9 @@ def as_recorded(
     mass_std: float = MASS_STD,
     velocity_std: float = VELOCITY_STD,
     force_scale_std: float = FORCE_SCALE_STD,
+    position_scale_std: float = POSITION_SCALE_STD,
 ) -> Capture:
-    """Say what nobody knows exactly of a measured tap: first contact, mass, velocity, scale of the force.
+    """Say what nobody knows exactly of a measured tap: first contact, mass, velocity, the sensors' scales.
 
     The standard deviations are relative; what the capture says itself is kept where it is more.
     """
@@ -170,4 +176,5 @@ def as_recorded(
         mass_std=max(opened.mass_std, mass_std),
         velocity_std=max(opened.velocity_std, velocity_std),
         force_scale_std=max(opened.force_scale_std, force_scale_std),
+        position_scale_std=max(opened.position_scale_std, position_scale_std),
     )

@@ -79,7 +79,7 @@ class WearState:
     """Friction followed over time: `level` is mu_s at the reference batch, `rate` its change per cycle.
 
     Standard deviations here come from how the estimates scatter. What all estimates of a cell share, such as
-    an error of mass, of the force's scale or of the prior on mu_k/mu_s, moves the level as a whole: changes
+    an error of mass, of a sensor's scale or of the prior on mu_k/mu_s, moves the level as a whole: changes
     are known better than the level itself. Probability and cycles to the limit are those of the level as the
     cell measures it, for a limit that was set by what the cell shows. Cycles to the limit take wear to go on
     as it has; its rate may change by half of itself (95 %) over as many cycles as it was

@@ -157,6 +157,8 @@ class SensorSection(Section):
     """Position sensor."""
     force_scale_error_percent: ErrorPercent = _CAPTURE.recorder_std[2] * 100.0
     """One standard deviation of the force sensor's scale; 0 where it is exact to 0.01 %."""
+    position_scale_error_percent: ErrorPercent = _CAPTURE.recorder_std[3] * 100.0
+    """One standard deviation of the position sensor's scale, which mu_k follows; 0 where it is exact."""
 
 
 class TrackingSection(Section):
@@ -272,15 +274,16 @@ class CellSettings(Section):
     """The live page; null: none."""
 
     @property
-    def recorder_std(self) -> tuple[float, float, float]:
-        """Relative standard deviations of mass, velocity and the scale of the force."""
+    def recorder_std(self) -> tuple[float, float, float, float]:
+        """Relative standard deviations of mass, velocity and the scales of force and position."""
         per_cent = (
             self.part.mass_error_percent,
             self.actuator.velocity_error_percent,
             self.sensors.force_scale_error_percent,
+            self.sensors.position_scale_error_percent,
         )
-        mass, velocity, scale = (one / 100.0 for one in per_cent)
-        return mass, velocity, scale
+        mass, velocity, force_scale, position_scale = (one / 100.0 for one in per_cent)
+        return mass, velocity, force_scale, position_scale
 
 
 def schema() -> str:

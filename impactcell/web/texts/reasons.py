@@ -20,6 +20,8 @@ GERMAN: Final = {
         r"dieser Stoß ist der von \1 mm/min, nicht \2 mm/min: Geschwindigkeit prüfen",
     r"the force is (\S+) times that of the model: check its scale":
         r"die Kraft ist \1-mal die des Modells: ihren Maßstab prüfen",
+    r"the position is (\S+) times that of the model: check its scale":
+        r"der Weg ist \1-mal der des Modells: seinen Maßstab prüfen",
     r"mu_s through mu_k/mu_s of the model: the part moved at once":
         "µs über µk/µs des Modells: das Teil bewegte sich sofort",
     r"no (force|position) was recorded": r"\1 wurde nicht aufgezeichnet",

@@ -112,9 +112,11 @@ def test_what_the_module_leaves_out_is_filled_in_and_what_it_says_stays() -> Non
     assert (filled.force.noise_std, filled.position.noise_std) == (0.3, 2e-6)
     assert filled.actuator.noise_std is None
     assert filled.onset_std_s == 0.5  # half of the force's sampling step
-    assert (filled.mass_std, filled.velocity_std, filled.force_scale_std) == (0.01, 0.005, 0.01)
-    exact = fill_defaults(replace(defaults, recorder_std=(0.0, 0.001, 0.02)), silent)
-    assert (exact.mass_std, exact.velocity_std, exact.force_scale_std) == (0.0, 0.001, 0.02)
+    assert (filled.mass_std, filled.velocity_std) == (0.01, 0.005)
+    assert (filled.force_scale_std, filled.position_scale_std) == (0.01, 0.003)
+    exact = fill_defaults(replace(defaults, recorder_std=(0.0, 0.001, 0.02, 0.004)), silent)
+    assert (exact.mass_std, exact.velocity_std) == (0.0, 0.001)
+    assert (exact.force_scale_std, exact.position_scale_std) == (0.02, 0.004)
     said = replace(
         silent,
         mass_kg=18.9,

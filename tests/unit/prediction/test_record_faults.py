@@ -35,7 +35,7 @@ def test_a_single_value_has_no_rate() -> None:
 def model_of_a_tap() -> tuple[LinearisedModel, Samples]:
     capture = Tap(0.05).capture(np.random.default_rng(1), force_hz=1e5)
     response = linearised_model(extract(as_recorded(capture)), PLANT)
-    return response, np.append(parameters_of(PLANT), [0.3, -0.2, 0.1, 0.4])
+    return response, np.append(parameters_of(PLANT), [0.3, -0.2, 0.1, 0.4, -0.5])
 
 
 def whole_problem(response: LinearisedModel, theta: Samples) -> tuple[Samples, Samples]:
