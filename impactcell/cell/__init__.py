@@ -1,6 +1,6 @@
 """One cycle of a cell, from what was measured to what is shown: `pipeline`, after `preprocessing`."""
 
-from impactcell.cell.model_change import PROVISIONAL, in_place_of
+from impactcell.cell.model_change import in_place_of
 from impactcell.cell.pipeline import (
     CellDesign,
     CellState,
@@ -17,7 +17,6 @@ from impactcell.cell.pipeline import (
 from impactcell.cell.preprocessing import fill_defaults
 
 __all__ = [
-    "PROVISIONAL",
     "CellDesign",
     "CellState",
     "StepResult",

@@ -7,8 +7,6 @@ from typing import Final
 from impactcell.prediction import Model
 from impactcell.serialization import pack
 
-PROVISIONAL: Final = "provisional"
-"""In the provenance of a model that nothing was measured of."""
 REPLACED: Final = "replaces provisional"
 """In that of a model which takes its place: its digest."""
 
@@ -25,7 +23,7 @@ def in_place_of(before: Model, model: Model) -> Model:
     provisional model comes back into service, which says that of itself. Until a cycle has come, a second
     model takes the place of the provisional one as well.
     """
-    digest = model_digest(before) if PROVISIONAL in before.provenance else before.provenance.get(REPLACED)
-    if digest is None or PROVISIONAL in model.provenance:
+    digest = model_digest(before) if before.is_provisional else before.provenance.get(REPLACED)
+    if digest is None or model.is_provisional:
         return model
     return replace(model, provenance={**model.provenance, REPLACED: digest})

@@ -22,7 +22,7 @@ from impactcell.alarms import (
     RuleResult,
     Transition,
 )
-from impactcell.cell.model_change import PROVISIONAL, REPLACED, model_digest
+from impactcell.cell.model_change import REPLACED, model_digest
 from impactcell.cell.preprocessing import (
     BatchNaming,
     CaptureDefaults,
@@ -150,8 +150,8 @@ def migrate_state(design: CellDesign, state: CellState) -> CellState:
     if state.model_digest == digest:
         return state
     has_changed = bool(state.model_digest)
-    provenance = design.model.provenance
-    if has_changed and (PROVISIONAL in provenance or provenance.get(REPLACED) == state.model_digest):
+    model = design.model
+    if has_changed and (model.is_provisional or model.provenance.get(REPLACED) == state.model_digest):
         state = replace(state, tracker=TrackerState(clock=state.tracker.clock))
     gap = gap_cusum.GapState() if has_changed else state.gap
     return replace(state, gap=gap, model_digest=digest, model_changed=state.model_changed or has_changed)

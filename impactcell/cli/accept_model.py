@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from impactcell.cell import PROVISIONAL, in_place_of
+from impactcell.cell import in_place_of
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.own_taps import OwnTaps, compare_on_own_taps
 from impactcell.cli.paths import check_output
@@ -114,7 +114,7 @@ def restore_model(cell: Path, *, as_json: bool = False) -> None:
     in_service = target.read_bytes()
     write_model(model, target)
     previous.write_bytes(in_service)
-    if PROVISIONAL in model.provenance:
+    if model.is_provisional:
         print_note(
             f"{model.name} is the guess that `impactcell model fit` replaced: nothing of it was measured; "
             f"wear and batches are learned anew by it, and anew once more when you fit again or restore again"

@@ -11,7 +11,6 @@ from typing import Final
 from impactcell.api.first_model import TAPS, FirstModel, fit_first_model
 from impactcell.campaign import Campaign, read
 from impactcell.campaign.recorded_campaign import from_captures
-from impactcell.cell import PROVISIONAL
 from impactcell.cli.accept_model import put_into_service
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.paths import note_damage, open_journal
@@ -50,7 +49,7 @@ def fit_model(
     model = calibrated_model(replace(config, model=first.fit.model))
     put_into_service(config, model)
     say_first_model(first, config.settings.model, as_json=as_json)
-    if PROVISIONAL in config.model.provenance:
+    if config.model.is_provisional:
         print_note("wear and batches are learned anew: what was learned by the provisional model is not kept")
     for finding in judge_cell(read_cell(cell)):
         if finding.is_fault or finding.section == "sensors":  # taps show what noise there is

@@ -14,14 +14,13 @@ import yaml
 
 from impactcell.api.first_model import fit_first_model
 from impactcell.campaign import Campaign, read
-from impactcell.cell import PROVISIONAL
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.first_model import say_first_model
 from impactcell.cli.paths import check_directory
 from impactcell.errors import PredictionError, SettingsError
 from impactcell.features import noise_std
 from impactcell.physics import Plant
-from impactcell.prediction import Model
+from impactcell.prediction import PROVISIONAL, Model
 from impactcell.prediction.model import Prior
 from impactcell.process.console import print_note, print_result
 from impactcell.process.shipped import shipped_config

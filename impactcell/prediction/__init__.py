@@ -3,6 +3,7 @@
 from impactcell.prediction.calibration import calibrate
 from impactcell.prediction.estimate import estimate, estimate_from_features
 from impactcell.prediction.model import (
+    PROVISIONAL,
     DistanceForm,
     ForceForm,
     Model,
@@ -13,6 +14,7 @@ from impactcell.prediction.model import (
 )
 
 __all__ = [
+    "PROVISIONAL",
     "DistanceForm",
     "ForceForm",
     "Model",

@@ -37,13 +37,21 @@ def by_force(
     value = (peak.value - mixed.velocity_n_s_per_m * velocity_m_s) / slope
     if value <= 0.0:
         raise PredictionError(
-            f"peak force {peak.value:.4g} N is below that of a part without friction; check mass and velocity"
+            f"peak force {peak.value:.4g} N is below that of a part without friction; "
+            f"{_way_out(model, 'mass and velocity')}"
         )
     sensitivity = _sensitivity(mixed, lambda predictor: predictor.force_sensitivity)
     rms = mixed.mean(lambda predictor: predictor.force.rms)
     calibration_std = value * _relative_calibration_std(model, sensitivity)
     stds = math.hypot(peak.std / slope, rms, calibration_std), math.hypot(rms, calibration_std)
     return _graded(model, mixed, velocity_m_s, value, *stds)
+
+
+def _way_out(model: Model, suspects: str) -> str:
+    """Say what to do about a figure that no friction makes: a provisional model is to blame itself."""
+    if model.is_provisional:
+        return "the model is provisional: run `impactcell model fit` after 30 taps"
+    return f"check {suspects}"
 
 
 def by_distance(
@@ -63,12 +71,13 @@ def by_distance(
     if slide.value < shortest:
         raise NegativeRootError(
             f"sliding distance {1e6 * slide.value:.4g} µm is below {1e6 * shortest:.4g} µm, the shortest for "
-            f"which equation (5) has a root at {velocity_m_s:.4g} m/s; check mass, stroke and velocity"
+            f"which equation (5) has a root at {velocity_m_s:.4g} m/s; "
+            f"{_way_out(model, 'mass, stroke and velocity')}"
         )
     if slide.value > mixed.sliding_distance(MIN_MU_S, velocity_m_s):
         raise PredictionError(
             f"sliding distance {1e6 * slide.value:.4g} µm is that of a part without friction; "
-            "check mass and velocity"
+            f"{_way_out(model, 'mass and velocity')}"
         )
     if len(mixed.parts) == 1:
         value = mixed.parts[0][1].distance.root(slide.value, velocity_m_s)

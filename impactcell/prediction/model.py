@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
 
 from impactcell.physics import Plant
 from impactcell.records import MM_PER_MIN
@@ -105,6 +106,10 @@ class Predictor:
     distance_sensitivity: Sensitivity = Sensitivity()
 
 
+PROVISIONAL: Final = "provisional"
+"""In the provenance of a model that nothing was measured of."""
+
+
 @dataclass(frozen=True, slots=True)
 class Model:
     """All that a cell's predictors need to know.
@@ -138,6 +143,11 @@ class Model:
     def ratio(self) -> float:
         """mu_k / mu_s of the plant."""
         return self.plant.mu_k / self.plant.mu_s
+
+    @property
+    def is_provisional(self) -> bool:
+        """Whether nothing of it was measured on its cell."""
+        return PROVISIONAL in self.provenance
 
 
 def printed_predictor() -> Predictor:

@@ -226,7 +226,7 @@ class CellWorker:
         if fitted.signature is not state.signature:
             self.log.warning("the grid of the signature was changed: the signature is learned anew")
         if fitted.tracker is not state.tracker:
-            is_guess = core.PROVISIONAL in design.model.provenance
+            is_guess = design.model.is_provisional
             what = "a provisional model is in service" if is_guess else "the provisional model was replaced"
             self.log.warning("%s: wear and batches are learned anew", what)
         return fitted

@@ -71,6 +71,8 @@ TAP_REASONS: Final[Mapping[str, str]] = {
     r"sliding distance (\S+) µm is that of a part without friction":
         r"der Gleitweg \1 µm ist der eines Teils ohne Reibung",
     r"check mass and velocity": "Masse und Geschwindigkeit prüfen",
+    r"the model is provisional: run `impactcell model fit` after 30 taps":
+        "das Modell ist vorläufig: nach 30 Stößen `impactcell model fit` ausführen",
     r"check mass, stroke and velocity": "Masse, Hub und Geschwindigkeit prüfen",
     r"the (force|position) record is empty": r"die Aufzeichnung von \1 ist leer",
     r"the (force|position) record has (\d+) samples at (\d+) times":

@@ -9,8 +9,9 @@ import pytest
 from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, EventKind, Notification
 from impactcell.alarms.rules import module_connection
-from impactcell.cell import PROVISIONAL, CellDesign, CellState, in_place_of
+from impactcell.cell import CellDesign, CellState, in_place_of
 from impactcell.cell.model_change import model_digest
+from impactcell.prediction import PROVISIONAL
 from impactcell.records import BatchAnnouncement, Capture, PositioningState, Quality, Shelving
 from impactcell.service.factory import cell_design
 from impactcell.settings import read_cell

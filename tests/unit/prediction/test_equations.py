@@ -9,7 +9,7 @@ import pytest
 from impactcell.errors import NegativeRootError, PredictionError
 from impactcell.features import MeasuredFeature
 from impactcell.physics import Plant, TapInput
-from impactcell.prediction import Model, Prior, calibrate, printed_predictor
+from impactcell.prediction import PROVISIONAL, Model, Prior, calibrate, printed_predictor
 from impactcell.prediction.calibration import Regime, fit_predictor, regimes, velocity_spans
 from impactcell.prediction.equations import (
     beyond_calibration,
@@ -151,6 +151,17 @@ def test_a_negative_root_and_a_frictionless_part_are_named() -> None:
         by_distance(PRINTED, mixed, 0.08, MeasuredFeature(1.0, 1e-6))
     with pytest.raises(PredictionError, match="without friction"):
         by_force(PRINTED, mixed, 0.08, MeasuredFeature(10.0, 0.1))
+
+
+def test_a_provisional_model_blames_itself_not_the_part() -> None:
+    """It was mass and velocity that were to be checked, in tap after tap of a cell that was set up right."""
+    guessed = replace(PRINTED, provenance={PROVISIONAL: "nothing measured"})
+    mixed = interpolate_mass(PRINTED, 18.9, 0.08)
+    for model, way_out in ((PRINTED, "check mass"), (guessed, "run `impactcell model fit` after 30 taps")):
+        for by, feature in ((by_force, 10.0), (by_distance, 1.0), (by_distance, 1e-4)):
+            with pytest.raises(PredictionError, match=way_out) as fault:
+                by(model, mixed, 0.08, MeasuredFeature(feature, 1e-6))
+            assert german_reason(way_out_of := str(fault.value).rsplit("; ", 1)[1]) != way_out_of
 
 
 @pytest.mark.parametrize(
