@@ -174,7 +174,13 @@ SAID_BY = (
     "prediction/waveform",
 )
 """Modules whose errors become the reason of a coefficient."""
-PLACEHOLDERS = {"name": "force", "model.name!r": "'own'", "fault": "the part did not slide"}
+PLACEHOLDERS = {
+    "name": "force",
+    "model.name!r": "'own'",
+    "fault": "the part did not slide",
+    "_way_out(model, 'mass and velocity')": "check mass and velocity",
+    "_way_out(model, 'mass, stroke and velocity')": "check mass, stroke and velocity",
+}
 
 
 def sample(message: ast.expr) -> list[str]:
