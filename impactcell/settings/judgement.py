@@ -103,8 +103,7 @@ def _of_units(cell: CellConfig) -> Iterator[_Remark]:
 
 def _of_model(cell: CellConfig) -> Iterator[_Remark]:
     settings, model = cell.settings, cell.model
-    command = shlex.join(["impactcell", "calibrate", str(cell.path), "-o", str(settings.model)])
-    calibrate = f"run `{command}`, which keeps its plant"
+    calibrate = _calibrate(cell)
     if not model.predictors:
         yield _Remark(
             ("model",),
@@ -128,6 +127,20 @@ def _of_model(cell: CellConfig) -> Iterator[_Remark]:
             f"the wear limit {settings.alarms.wear_limit:g} is not above the friction of the model itself "
             f"(mu_s {model.plant.mu_s:.4g}): the alarm would stand from the first cycle on",
         )
+
+
+def _calibrate(cell: CellConfig) -> str:
+    """Say how to calibrate a model for a cell: in its place where it lies beside the cell, else beside it.
+
+    Other cells may run with a model that lies elsewhere.
+    """
+    model = cell.settings.model
+    is_own = cell.path.resolve().parent in model.resolve().parents
+    target = model if is_own else cell.path.with_name(f"{cell.name}-model.yaml")
+    command = shlex.join(["impactcell", "calibrate", str(cell.path), "-o", str(target)])
+    if is_own:
+        return f"run `{command}`, which keeps its plant"
+    return f"run `{command}`, which keeps its plant, and name that file as `model` (others may use this one)"
 
 
 def _of_predictors(cell: CellConfig, calibrate: str) -> Iterator[_Remark]:

@@ -435,10 +435,15 @@ def test_what_is_advised_can_be_typed_as_it_stands_and_helps(
         said = json.loads(capsys.readouterr().out)
         return re.findall("`(impactcell calibrate .*?)`", json.dumps(said["faults"] + said["notes"]))
 
+    shared = (config / "models/prototype.yaml").read_bytes()
     [command] = advice()
     run(*shlex.split(command)[1:])
     capsys.readouterr()
+    content = yaml.safe_load((config / "cells/prototype.yaml").read_text())
+    change(content, "model", Path(shlex.split(command)[-1]).name)
+    (config / "cells/prototype.yaml").write_text(yaml.safe_dump(content))
     assert advice() == []
+    assert (config / "models/prototype.yaml").read_bytes() == shared, "other cells may run with it"
 
 
 def test_faults_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
