@@ -52,6 +52,11 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
     if len(taps) > len(records):
         told = "1 record" if len(records) == 1 else f"{len(records)} records"
         notes.append(f"{told} cut into {len(taps)} taps where the force begins anew")
+    if not any(ColumnMeaning.POSITION in record.values for record in records):
+        notes.append(
+            "no position was recorded: such taps tell mu_s by peak force and the model of a cell, and no "
+            "model by themselves (--column position=NAME if there is one)"
+        )
     starts = _contact_times(taps, notes)
     return [
         _capture(n, tap, t0, given) for n, (tap, t0) in enumerate(zip(taps, starts, strict=True), 1)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import impactcell
-from impactcell.measurements import guess, make_campaign, read_tables
+from impactcell.measurements import ColumnMeaning, guess, make_campaign, read_tables
 from impactcell.prediction.equations import beyond_calibration
 from impactcell.tracking.wear_batch import initial_state
 from impactcell.tracking.wear_batch.batch_change_detection import reason_not_ready
@@ -128,6 +128,20 @@ def test_what_import_notes_of_taps_is_said_in_german(tmp_path: Path) -> None:
     assert {language for language, _ in said} == {"de"}, said
     assert ("de", "die Zeilen neben den Spalten sagen: Masse 18,9 kg, Geschwindigkeit 3000 mm/min") in said
     assert not any("--" in page_note(note, language)[1] for note in notes for language in ("en", "de"))
+
+
+def test_that_taps_have_no_position_is_said_in_both_languages(tmp_path: Path) -> None:
+    """It came out when friction was asked for: "no tap of the campaign can be used"."""
+    write_logger_file(tmp_path / "tap.csv", taps((3000,), (18.9,))[0], np.random.default_rng(2))
+    tables = read_tables(tmp_path / "tap.csv")
+    whole = guess(tables)
+    forces = [item for item in whole.assignments if item.meaning is not ColumnMeaning.POSITION]
+    notes = make_campaign(tables, replace(whole, assignments=tuple(forces))).notes
+    (told,) = [note for note in notes if "no position" in note]
+    assert page_note(told, "en")[1].endswith("and no model by themselves")
+    assert page_note(told, "de") == ("de", page_note(told, "de")[1])
+    assert "keine Position" in page_note(told, "de")[1]
+    assert not [note for note in make_campaign(tables, whole).notes if "no position" in note]
 
 
 def test_what_import_notes_of_faulty_data_is_said_in_german(tmp_path: Path) -> None:
