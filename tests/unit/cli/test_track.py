@@ -5,8 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import impactcell
+from impactcell.cli.app import app
 from impactcell.cli.track import track
 from impactcell.errors import SeriesError
 
@@ -286,3 +288,13 @@ def test_other_faults(tmp_path):
         track(path, "known")
     with pytest.raises(SeriesError, match="say known or unknown"):
         track(path, "maybe")
+
+
+@pytest.mark.parametrize(
+    ("text", "way_out"),
+    [("0,25", "decimals have a point: 0.25"), ("25%", "write digits"), ("", "write digits")],
+)
+def test_an_option_that_is_no_number_is_told_with_the_way_out(text, way_out):
+    done = CliRunner(env={"COLUMNS": "300"}).invoke(app, ["track", "s.csv", "--limit", text])
+    assert done.exit_code == 2
+    assert f"Invalid value for '--limit': {text!r} is no number; {way_out}" in " ".join(done.output.split())
