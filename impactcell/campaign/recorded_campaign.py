@@ -22,11 +22,14 @@ class RecordedCampaign:
         Cycles struck with another stroke than most; a campaign has one.
     no_channels : int
         Cycles without any samples.
+    sessions : int
+        From how many sessions of the module they are: with each it counts its cycles anew.
     """
 
     campaign: Campaign
     other_stroke: int
     no_channels: int
+    sessions: int
 
 
 def from_captures(captures: Iterable[Capture], gravity_m_s2: float = 9.81) -> RecordedCampaign:
@@ -64,7 +67,8 @@ def from_captures(captures: Iterable[Capture], gravity_m_s2: float = 9.81) -> Re
         sensors=_sensors(shots),
         columns=(*_COLUMNS, *covariates),
     )
-    return RecordedCampaign(campaign, len(recorded) - len(kept), len(every) - len(recorded))
+    sessions = len({capture.session for capture in kept})
+    return RecordedCampaign(campaign, len(recorded) - len(kept), len(every) - len(recorded), sessions)
 
 
 def _sensors(shots: Sequence[Capture]) -> dict[str, Sensor]:

@@ -31,4 +31,8 @@ def export(
         print_note(f"{recorded.other_stroke} cycles with another stroke were left out")
     if recorded.no_channels:
         print_note(f"{recorded.no_channels} cycles without samples were left out")
+    if recorded.sessions > 1:
+        print_note(
+            f"the module restarted meanwhile: cycles of {recorded.sessions} sessions have these numbers"
+        )
     print_result(f"{len(recorded.campaign.shots)} shots in {output}")

@@ -25,10 +25,11 @@ def fill(path: Path, captures: list[Capture]) -> None:
             journal.append(capture, make_snapshot(capture), b"state")
 
 
-def test_round_trip(tmp_path: Path) -> None:
+def test_round_trip(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     captures = [replace(make_capture(cycle), stroke_m=1.5e-3) for cycle in range(1, 6)]
     fill(tmp_path / "j", captures)
     export(tmp_path / "j", tmp_path / "campaign", first_cycle=2, last_cycle=4)
+    assert capsys.readouterr().err == ""
     back = campaign.read(tmp_path / "campaign")
     assert [shot.cycle for shot in back.shots] == [2, 3, 4]
     assert back.stroke_m == 1.5e-3
@@ -54,9 +55,10 @@ def test_a_batch_that_a_person_named_is_exported(tmp_path: Path) -> None:
     assert [shot.batch_id for shot in back.shots] == [None, "lot 17", "lot 17"]
 
 
-def test_repeated_cycle_numbers_are_counted_anew(tmp_path: Path) -> None:
+def test_repeated_cycle_numbers_are_counted_anew(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     fill(tmp_path / "j", [make_capture(1, session=1), make_capture(1, session=2)])
     export(tmp_path / "j", tmp_path / "campaign")
+    assert "the module restarted meanwhile: cycles of 2 sessions" in capsys.readouterr().err
     back = campaign.read(tmp_path / "campaign")
     assert [(s.cycle, s.covariates["session"], s.covariates["cycle"]) for s in back.shots] == [
         (1, 1, 1),
