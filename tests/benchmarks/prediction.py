@@ -6,7 +6,9 @@ Every shot is made by the simulator's own plant (`simulator.plant`), never by `i
 import math
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -16,7 +18,7 @@ from impactcell.prediction import Model, calibrate, estimate, printed_predictor
 from impactcell.prediction.calibration import fit_predictor
 from impactcell.prediction.mass_interpolation import sliding_distance
 from impactcell.prediction.waveform import fit
-from impactcell.records import Quality, as_recorded, with_open_onset
+from impactcell.records import Capture, Channel, Quality, as_recorded, with_open_onset
 from tests.benchmarks._prediction_shots import (
     FRICTIONS,
     MASS_KG,
@@ -132,47 +134,35 @@ def table_of_velocities(shots_a_velocity: int) -> Table:
     )
 
 
+TOLD_WRONG = (
+    "standard deviation of the error", "Good", "RMS error", "median std told", "within 1.96 std",
+    "largest / std",
+)  # fmt: skip
+"""Columns of the two tables that follow."""
+
+
 def table_of_what_was_told(shots: int) -> Table:
     """Mass, velocity or the force's scale off by a little, the same in no two taps."""
-    model = Model("reference", PLANT, PRIOR, ())
+
+    def told(seen: Capture, wrong: str, factor: float) -> Capture:
+        return replace(
+            seen,
+            mass_kg=seen.mass_kg * (factor if wrong == "mass" else 1.0),
+            velocity_m_s=seen.velocity_m_s * (factor if wrong == "velocity" else 1.0),
+            force=_scaled(seen.force, factor if wrong == "force" else 1.0),
+        )
+
     rows = []
     for wrong, error in [
         ("nothing", 0.0),
         *((wrong, error) for wrong in ("mass", "velocity", "force") for error in (1e-3, 3e-3, 1e-2)),
     ]:
-        rng = np.random.default_rng(37)
-        found: dict[str, list[tuple[float, float]]] = {"as measured": [], "taken as exact": []}
-        for _ in range(shots):
-            ratio = RATIO * (1.0 + 0.03 * rng.standard_normal())
-            truth = Truth(rng.uniform(2000, 6000) / 6e4, rng.uniform(0.15, 0.25), ratio)
-            seen = shot(truth, rng, force_hz=100e3, late_s=1e-5 * rng.uniform())
-            factor = 1.0 + error * rng.standard_normal()
-            seen = replace(
-                seen,
-                mass_kg=seen.mass_kg * (factor if wrong == "mass" else 1.0),
-                velocity_m_s=seen.velocity_m_s * (factor if wrong == "velocity" else 1.0),
-                force=replace(seen.force, values=seen.force.values * (factor if wrong == "force" else 1.0)),
-            )
-            for name, given in (
-                ("as measured", as_recorded(seen)),
-                ("taken as exact", with_open_onset(seen)),
-            ):
-                mu_s = estimate(given, model).mu_s
-                if mu_s.quality is Quality.GOOD:
-                    found[name].append((mu_s.value / truth.mu_s - 1.0, mu_s.std / truth.mu_s))
-        for name, of_shots in found.items():
-            what = "nothing wrong" if wrong == "nothing" else f"{wrong}, {100 * error:g} %"
-            rows.append((f"{what}, {name}", *_of_good(of_shots, shots)))
+        what = "nothing wrong" if wrong == "nothing" else f"{wrong}, {100 * error:g} %"
+        found = _errors(shots, 37, error, partial(told, wrong=wrong), with_open_onset, "mu_s")
+        rows += [(f"{what}, {name}", *_of_good(of_shots, shots)) for name, of_shots in found.items()]
     return Table(
         "mu_s where mass, velocity or the scale of the force is told a little wrong",
-        (
-            "standard deviation of the error",
-            "Good",
-            "RMS error",
-            "median std told",
-            "within 1.96 std",
-            "largest / std",
-        ),
+        TOLD_WRONG,
         rows,
         f"{shots} shots a row at 100 kHz, 18.9 kg, mu_s 0.15-0.25, 2000-6000 mm/min, first contact anywhere "
         "within a step and fitted; waveform estimates with status Good. Cells take taps as measured.",
@@ -181,39 +171,57 @@ def table_of_what_was_told(shots: int) -> Table:
 
 def table_of_position_scale(shots: int) -> Table:
     """Scale of the position off by a little, the same in no two taps: mu_k follows it."""
-    model = Model("reference", PLANT, PRIOR, ())
     rows = []
+    exact = partial(as_recorded, position_scale_std=0.0)
     for error in (0.0, 1e-3, 3e-3, 1e-2):
-        rng = np.random.default_rng(38)
-        found: dict[str, list[tuple[float, float]]] = {"as measured": [], "taken as exact": []}
-        for _ in range(shots):
-            ratio = RATIO * (1.0 + 0.03 * rng.standard_normal())
-            truth = Truth(rng.uniform(2000, 6000) / 6e4, rng.uniform(0.15, 0.25), ratio)
-            seen = shot(truth, rng, force_hz=100e3, late_s=1e-5 * rng.uniform())
-            factor = 1.0 + error * rng.standard_normal()
-            seen = replace(seen, position=replace(seen.position, values=factor * seen.position.values))
-            for name, given in (
-                ("as measured", as_recorded(seen)),
-                ("taken as exact", as_recorded(seen, position_scale_std=0.0)),
-            ):
-                mu_k = estimate(given, model).mu_k
-                if mu_k.quality is Quality.GOOD:
-                    found[name].append((mu_k.value / truth.mu_k - 1.0, mu_k.std / truth.mu_k))
-        for name, of_shots in found.items():
-            rows.append((f"{100 * error:g} %, {name}", *_of_good(of_shots, shots)))
+        found = _errors(
+            shots,
+            38,
+            error,
+            lambda seen, factor: replace(seen, position=_scaled(seen.position, factor)),
+            exact,
+            "mu_k",
+        )
+        rows += [(f"{100 * error:g} %, {name}", *_of_good(taps, shots)) for name, taps in found.items()]
     return Table(
         "mu_k where the scale of the position is told a little wrong",
-        (
-            "standard deviation of the error",
-            "Good",
-            "RMS error",
-            "median std told",
-            "within 1.96 std",
-            "largest / std",
-        ),
+        TOLD_WRONG,
         rows,
         f"{shots} shots a row, as above.",
     )
+
+
+def _scaled(channel: Channel | None, factor: float) -> Channel:
+    assert channel is not None
+    return replace(channel, values=channel.values * factor)
+
+
+def _errors(
+    shots: int,
+    seed: int,
+    error: float,
+    told: Callable[..., Capture],
+    exact: Callable[[Capture], Capture],
+    which: str,
+) -> dict[str, list[tuple[float, float]]]:
+    """Relative errors and standard deviations of a coefficient of taps that are told a little wrong.
+
+    `told(seen, factor=...)` is what is told of a tap, `exact` how it is taken where that counts as exact.
+    """
+    model = Model("reference", PLANT, PRIOR, ())
+    rng = np.random.default_rng(seed)
+    found: dict[str, list[tuple[float, float]]] = {"as measured": [], "taken as exact": []}
+    for _ in range(shots):
+        ratio = RATIO * (1.0 + 0.03 * rng.standard_normal())
+        truth = Truth(rng.uniform(2000, 6000) / 6e4, rng.uniform(0.15, 0.25), ratio)
+        seen = shot(truth, rng, force_hz=100e3, late_s=1e-5 * rng.uniform())
+        seen = told(seen, factor=1.0 + error * rng.standard_normal())
+        for name, given in (("as measured", as_recorded(seen)), ("taken as exact", exact(seen))):
+            got = getattr(estimate(given, model), which)
+            if got.quality is Quality.GOOD:
+                true = getattr(truth, which)
+                found[name].append((got.value / true - 1.0, got.std / true))
+    return found
 
 
 def _of_good(of_shots: list[tuple[float, float]], shots: int) -> tuple[str, ...]:
