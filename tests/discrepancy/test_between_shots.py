@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from impactcell.discrepancy.data import prepare, sensor_noise, split_held_out
 from impactcell.discrepancy.model import ParameterEstimate
+from impactcell.discrepancy.nominal_model import nominal_models
 from impactcell.discrepancy.search import between_shots, chance_by_exchange, chance_of_narrowing, trace_rivals
+from impactcell.discrepancy.search.factor_likeness import fits_to_factors
 from impactcell.discrepancy.workflow import investigate
 from tests.discrepancy.study import Job, campaign
 
@@ -103,6 +106,21 @@ def test_what_the_factors_speak_for_as_much_is_tied_whether_it_acts_between_shot
     best: Any = SimpleNamespace(effects=("direction_asymmetry",), spread=0.02)
     other: Any = SimpleNamespace(effects=("surface_tilt",), spread=spread)
     assert between_shots.factor_rivals(best, [best, other], 30) == tied
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_tilt_is_as_strong_as_the_friction_factors_ask_for(seed: int) -> None:
+    """The traces say nothing: the factors of uphill and downhill taps differ by 2 tan(a) / mu."""
+    given = campaign(Job("model_error", ("surface_tilt", "wandering_force"), seed, shots=24), (1.5, 0.1))
+    prepared = prepare(given)
+    training, _ = split_held_out(prepared, seed)
+    nominal = nominal_models(prepared, sensor_noise(prepared), training, None).start
+    context: Any = SimpleNamespace(problem=nominal.problem, library=("surface_tilt", "viscous_friction"))
+    fits = {fit.effects[-1]: fit for fit in fits_to_factors(context, nominal.fit, nominal.fit)}
+    tilted = fits["surface_tilt"]
+    assert tilted.coordinates[-1].value(tilted.theta[-1]) == pytest.approx(1.5 * 0.004, abs=1.5e-3)
+    assert tilted.spread < 0.6 * nominal.fit.spread
+    assert "viscous_friction" not in fits or fits["viscous_friction"].spread > 0.9 * nominal.fit.spread
 
 
 @pytest.mark.long

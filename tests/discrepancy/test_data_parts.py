@@ -10,10 +10,10 @@ import pytest
 
 from impactcell.campaign import Excitation
 from impactcell.discrepancy.data import driven_blocks, measured_drive, prepare, prepared_campaign
-from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.measured_drive import SmoothedDrive, position_response, smooth_drive
 from impactcell.discrepancy.data.noise_at_rest import NoiseAtRest, noise_at_rest, std_of_pieces
 from impactcell.discrepancy.data.noise_floor import sensor_noise
+from impactcell.discrepancy.data.tap import Tap
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio, check_units
 from impactcell.errors import CampaignError
 from impactcell.records import Capture
@@ -236,11 +236,13 @@ def test_a_wrong_unit_is_told_with_the_factor_between_units(value: float, column
 def test_a_quarter_of_every_setting_is_held_out() -> None:
     """Whether a setting has many shots or one: over 400 splits, as often as chance allows."""
     velocities = np.array([1.0] * 8 + [2.0] * 5 + [3.0])
-    shots: Any = [SimpleNamespace(velocity_m_s=velocity, direction=1) for velocity in velocities.tolist()]
-    strategy: Any = None
+    shots: Any = [
+        SimpleNamespace(velocity_m_s=velocity, direction=1, mass_kg=1.0, covariates={})
+        for velocity in velocities.tolist()
+    ]
     share = np.zeros(len(shots))
     for seed in range(400):
-        training, held_out = ExcitationStrategy.split(strategy, shots, seed)
+        training, held_out = Tap().split(shots, seed)
         assert sorted([*training, *held_out]) == list(range(len(shots)))
         share[held_out] += 1.0 / 400
     spread = 4.0 * math.sqrt(share.mean() * (1.0 - share.mean()) / 400)

@@ -104,7 +104,7 @@ def test_a_law_with_a_memory_is_not_mistaken_for_one_of_position() -> None:
     )
     assert outcome.law is not None
     assert outcome.law.proposed is None
-    assert "alone" in outcome.law.refused
+    assert "what is missing is no function of indentation" in outcome.law.refused
 
 
 @given(st.sampled_from(ATOMS), st.floats(0.0, 2.0), st.data())

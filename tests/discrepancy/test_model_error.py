@@ -68,14 +68,14 @@ def test_what_has_no_part_in_a_gap_stands_out_as_rarely_as_stated() -> None:
     for _ in range(4000):
         left, direction = rng.standard_normal((2, pieces))
         taken = (left @ direction) ** 2 / (direction @ direction)
-        rest = ModelError(float(left @ left - taken), 1.0, float(pieces))
+        rest = ModelError(float(left @ left - taken), 1.0, 1.0, float(pieces))
         p_values.append(share_p_value(float(left @ left), rest, 1))
     for level in (0.01, 0.05, 0.2):
         assert np.mean(np.array(p_values) <= level) == pytest.approx(level, rel=0.35)
 
 
 def test_fewer_pieces_tell_fewer_rivals_apart() -> None:
-    few, many = (largest_rival_excess(ModelError(1.0, 1.0, pieces), 0.9) for pieces in (5.0, 100.0))
+    few, many = (largest_rival_excess(ModelError(1.0, 1.0, 1.0, pieces), 0.9) for pieces in (5.0, 100.0))
     assert few > 3.0
     assert 1.0 < many < 1.4
 

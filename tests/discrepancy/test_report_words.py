@@ -8,7 +8,7 @@ import pytest
 
 from impactcell.discrepancy.report import figures, machine_sentences, sentences
 from impactcell.discrepancy.search.gap import Gap, Part
-from impactcell.discrepancy.search.validation import GapChange
+from impactcell.discrepancy.search.gap_measure import GapChange
 from impactcell.german.findings import german_headline
 from impactcell.german.parameters import parameter_words
 from impactcell.physics.effect_names import as_title, identifier_of, in_words

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from impactcell.discrepancy.data import MIN_HELD_OUT, MIN_TRAINING
+from impactcell.discrepancy.model import effect_coordinates
 from impactcell.discrepancy.search import (
     acceptance,
     between_shots,
@@ -20,6 +21,7 @@ from impactcell.discrepancy.search import (
     wild_bootstrap,
 )
 from impactcell.discrepancy.search.acceptance import accept_set
+from impactcell.discrepancy.search.candidate_fits import finalists, is_at_bound, prefer_interior
 from impactcell.discrepancy.search.conclusion import missing_shots
 from impactcell.discrepancy.search.indistinguishability import CandidateFit
 from impactcell.discrepancy.search.policy import POLICY
@@ -207,7 +209,11 @@ def test_a_rival_that_leaves_the_factors_wider_is_told_apart_though_a_few_shots_
 
     def candidate(effect: str, spread: float, each: list[float]) -> Any:
         fit = SimpleNamespace(
-            effects=(effect,), coordinates=(), theta=(), spread=spread, misfit=lambda _: np.full(20, 50.0)
+            effects=(effect,),
+            coordinates=(),
+            theta=np.empty(0),
+            spread=spread,
+            misfit=lambda _: np.full(20, 50.0),
         )
         return CandidateFit(fit, np.array(each))
 
@@ -216,9 +222,79 @@ def test_a_rival_that_leaves_the_factors_wider_is_told_apart_though_a_few_shots_
     nominal: Any = SimpleNamespace(
         fit=SimpleNamespace(effects=()), candidate_scan=SimpleNamespace(p_value_of=lambda _: 0.001)
     )
-    problem: Any = SimpleNamespace(count=20, shots=None, sizes=np.full(20, 50))
+    shots = SimpleNamespace(visited_m=(-0.01, 0.01))
+    problem: Any = SimpleNamespace(count=20, shots=shots, sizes=np.full(20, 50))
     found = accept_set(problem, (nominal, nominal), sets, [], [], ())
     assert found.ties == {"direction_asymmetry": tied}
+
+
+SLID: Any = SimpleNamespace(visited_m=(-0.008, 0.006))
+
+
+def shaped(effect: str, residual: float = 0.0, **values: float) -> Any:
+    """Fit of one effect with these parameters, the others typical."""
+    coordinates = effect_coordinates(effect, 1)
+    theta = [c.coordinate(values.get(c.parameter, c.value(c.initial))) for c in coordinates]
+    return SimpleNamespace(
+        effects=(effect,), coordinates=coordinates, theta=np.array(theta), residual=np.full(100, residual)
+    )
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "is_name"),
+    [
+        ("friction_patch", {"position_m": 0.002, "width_m": 0.001}, True),
+        ("friction_patch", {"position_m": 0.0061, "width_m": 0.001}, False),
+        ("friction_patch", {"position_m": -0.0081, "width_m": 0.001}, False),
+        ("friction_patch", {"position_m": 0.002, "width_m": 0.015}, False),
+        ("friction_patch", {"position_m": 0.002, "width_m": 5e-5}, False),  # the end of its range
+        ("periodic_friction", {"period_m": 0.027}, True),
+        ("periodic_friction", {"period_m": 0.029}, False),
+        ("viscous_friction", {}, True),
+    ],
+)
+def test_a_shape_where_no_shot_has_been_is_no_name(
+    effect: str, values: dict[str, float], *, is_name: bool
+) -> None:
+    """A patch far beyond the end of all slides was named for friction that grows along the table."""
+    assert is_at_bound(SLID, shaped(effect, **values)) is not is_name
+
+
+def test_without_a_position_no_shape_is_where_no_shot_has_been() -> None:
+    nowhere: Any = SimpleNamespace(visited_m=(0.0, 0.0))
+    assert not is_at_bound(nowhere, shaped("friction_patch", position_m=0.03))
+
+
+@pytest.mark.parametrize(("left", "first"), [(1.2, "position_dependent_friction"), (1.5, "friction_patch")])
+def test_a_name_inside_its_range_goes_before_a_shape_at_its_end_that_leaves_little_less(
+    left: float, first: str
+) -> None:
+    """Of a squared gap of 15 it may leave 0.75 more."""
+    nominal, beyond = shaped("viscous_friction", 4.0), shaped("friction_patch", 1.0, position_m=0.02)
+    nominal.effects = ()
+    inside = shaped("position_dependent_friction", left)
+    ranking = [CandidateFit(beyond, np.zeros(20)), CandidateFit(inside, np.full(20, -40.0))]
+    problem: Any = SimpleNamespace(shots=SLID, sizes=np.full(20, 50))
+    beyond.misfit = lambda _: np.full(20, 50.0)
+    assert prefer_interior(problem, nominal, ranking)[0].fit.effects == (first,)
+
+
+def test_of_the_likeliest_as_many_inside_their_range_are_finalists_as_others() -> None:
+    def likely(fit: Any, each: float) -> Any:
+        fit.log_likelihood = lambda _: np.full(20, each)
+        fit.misfit = lambda _: np.full(20, 50.0)
+        return fit
+
+    rough = [
+        likely(shaped("friction_patch", position_m=0.02), 0.0),
+        likely(shaped("periodic_friction", period_m=0.05), -50.0),
+        likely(shaped("position_dependent_friction"), -100.0),
+        likely(shaped("viscous_friction"), -200.0),
+        likely(shaped("restoring_force"), -300.0),
+    ]
+    coarse = SimpleNamespace(shots=SLID, sizes=np.full(20, 50))
+    context: Any = SimpleNamespace(coarse=coarse)
+    assert finalists(context, rough) == rough[:4]
 
 
 def test_effects_that_the_factors_speak_for_are_fitted_with_those_within_shots_that_no_fit_has_yet(

@@ -78,10 +78,10 @@ def test_scatter_from_shot_to_shot_is_found_in_every_shot_and_is_no_gap(actuator
     assert (found.verdict, found.added) == ("no_gap", ())
     assert found.validation.held_out.before.trace < 1.05
     own = found.nominal.shot_parameters
-    for name, std in (("velocity", 1.5e-4), ("mass", 6e-4)):
+    for name, scattered in (("velocity", 0.002), ("mass", 0.004)):
         truth = np.log([getattr(shots[int(i)].plan, f"{name}_over_told") for i in found.training])
         error = getattr(own, f"log_{name}") - truth
-        assert np.sqrt(np.mean(error**2)) < std
+        assert np.sqrt(np.mean(error**2)) < 0.15 * scattered
         mean, scatter = said_of(found)[name.capitalize()]
         assert mean == pytest.approx(100.0 * truth.mean(), abs=0.05)
         assert scatter == pytest.approx(100.0 * truth.std(), rel=0.2)

@@ -17,7 +17,7 @@ from impactcell.discrepancy.report.sentences import headline
 from impactcell.discrepancy.search.conclusion import missing_shots
 from impactcell.discrepancy.search.confirmation import NestedModels, confirmed
 from impactcell.discrepancy.search.gap import Gap, Part, narrows
-from impactcell.discrepancy.search.validation import GapChange, GapMeasure
+from impactcell.discrepancy.search.gap_measure import GapChange, GapMeasure
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.records import Capture, Channel
 from tests.benchmarks._discrepancy_driven import Job, record
@@ -266,7 +266,7 @@ def test_an_effect_may_be_sure_in_the_part_that_falls_less(p_value: float, is_su
 
 
 def test_what_held_out_shots_do_not_confirm_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("impactcell.discrepancy.search.validation.MIN_CLOSED_SHARE", 2.0)
+    monkeypatch.setattr("impactcell.discrepancy.search.gap_measure.MIN_CLOSED_SHARE", 2.0)
     found = name_effects(make("viscous_friction", shots=24))
     outcome = result_document(found)
     assert outcome["verdict"] == "unknown"

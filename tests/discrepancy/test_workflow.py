@@ -18,7 +18,7 @@ from impactcell.discrepancy.model.least_squares import Fit, fit
 from impactcell.discrepancy.model.problem import remove_jumps
 from impactcell.discrepancy.model.shot_fits import fit_shot_parameters
 from impactcell.discrepancy.report.result import json_text, result_document
-from impactcell.discrepancy.search.candidate_fits import finalists
+from impactcell.discrepancy.search.candidate_fits import finalists, is_at_bound
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.indistinguishability import (
     are_indistinguishable,
@@ -185,7 +185,7 @@ def test_a_shape_at_the_end_of_its_range_is_not_a_name() -> None:
     campaign = make("position_dependent_friction", seed=920030, shots=18)
     library = ("friction_patch", "periodic_friction", "direction_asymmetry", "viscous_friction")
     found = study.name_effects(campaign, library=library)
-    assert found.selection.alternatives[0].effects == ("friction_patch",)
+    assert is_at_bound(found.problem.shots, found.selection.alternatives[0].fit)
     assert answer(found) == ("unknown", set())
 
 

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
+from scipy.stats import rankdata
 
 from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.data.phases import Trajectory
@@ -24,6 +25,9 @@ MIN_TRAINING = 9
 and half of the error of a step is 0.005."""
 MIN_HELD_OUT = 5
 """Held-out shots or blocks that can say a gap falls: with the signs of n at random p is 2^-n at best."""
+DIVISIONS, MOST_ALIKE = 400, 20
+"""Divisions that are drawn, and of how many of them one has held-out shots that are alike enough [1]: of these
+the first is taken, so that it is left to chance which."""
 
 NO_DRIVE = np.empty((2, 0))
 """Drive of a part that is not driven."""
@@ -110,10 +114,21 @@ class ExcitationStrategy(ABC):
 
         A quarter is held out, spread over the settings: of one that has replicates a quarter of them, as near
         as that can be, and of the shots that are alone in theirs a quarter too, so that the model is also
-        asked where it was not fitted.
+        asked where it was not fitted. Of many such divisions it is one whose held-out shots are like those
+        of their settings in whatever else differs (rerandomisation, Morgan & Rubin 2012), the energy of a
+        tap among it: what only hard taps show must be in both parts.
         """
-        n = len(shots)
         rng = np.random.default_rng([seed, 1])
+        divisions = [self._division(shots, rng) for _ in range(DIVISIONS if len(shots) > 1 else 1)]
+        features = _features(shots)
+        distance = np.array([np.sum(features[held].mean(0) ** 2) for held in divisions])
+        nearest = np.argsort(distance, kind="stable")[: max(len(divisions) // MOST_ALIKE, 1)]
+        held_out = divisions[int(nearest.min())]
+        return np.setdiff1d(np.arange(len(shots)), held_out), held_out
+
+    def _division(self, shots: Sequence[PreparedShot], rng: np.random.Generator) -> IndexArray:
+        """Draw held-out shots, a quarter of each velocity and direction."""
+        n = len(shots)
         order = rng.permutation(n)
         strata = [_stratum(shot) for shot in shots]
         # Round after round one shot of every stratum, at evenly spread shares of it: the quarter with the
@@ -126,8 +141,7 @@ class ExcitationStrategy(ABC):
         count = np.array([count_of_stratum[stratum] for stratum in strata])
         share = (rank + rng.random(n)) / count
         wanted = max(round(HELD_OUT_SHARE * n), min(MIN_HELD_OUT, n - MIN_TRAINING), 1)
-        held_out = np.sort(np.lexsort((order, share))[:wanted])
-        return np.setdiff1d(np.arange(n), held_out), held_out
+        return np.sort(np.lexsort((order, share))[:wanted])
 
     def reduce(
         self, items: tuple[PreparedShot, ...], every: tuple[PreparedShot, ...], gravity_m_s2: float,
@@ -166,6 +180,28 @@ class ExcitationStrategy(ABC):
         """List settings that a next experiment could take, in words and as a shot; none by default."""
         del shots
         return []
+
+
+def _features(shots: Sequence[PreparedShot]) -> Samples:
+    """List how shots differ from those of their velocity and direction, of variance 1, shape (n, features).
+
+    Places in the order of each covariate and of the energy of a tap, and whether that is of the largest
+    quarter. Shots that are alone in their setting are held against each other.
+    """
+    names = sorted({name for shot in shots for name in shot.covariates})
+    columns = [np.array([shot.covariates.get(name, math.nan) for shot in shots]) for name in names]
+    columns.append(np.array([shot.mass_kg * shot.velocity_m_s**2 for shot in shots]))
+    columns = [rankdata(np.nan_to_num(column)) for column in columns]
+    columns.append((columns[-1] > (1.0 - HELD_OUT_SHARE) * len(shots)).astype(np.float64))
+    deviation = np.array(columns).T
+    strata = [_stratum(shot) for shot in shots]
+    alone = np.array([strata.count(stratum) == 1 for stratum in strata])
+    groups = [np.array([stratum == one for one in strata]) & ~alone for stratum in {*strata}]
+    for group in (alone, *groups):
+        deviation[group] -= deviation[group].mean(0) if group.any() else 0.0
+    size = deviation.std(0)
+    features: Samples = deviation[:, size > 0.0] / size[size > 0.0]
+    return features
 
 
 def _stratum(shot: PreparedShot) -> tuple[float, float]:

@@ -146,6 +146,14 @@ class ShotSet:
         )
 
     @property
+    def visited_m(self) -> tuple[float, float]:
+        """Lowest and highest position on the table that was measured [m]; (0, 0) where none was."""
+        along = [shot.start_m + shot.values[1] for shot in self.items if len(shot.values[1])]
+        if not along:
+            return 0.0, 0.0
+        return min(float(one.min()) for one in along), max(float(one.max()) for one in along)
+
+    @property
     def times(self) -> Samples:
         """Time of every sample, shape (N,)."""
         return np.concatenate([np.concatenate(shot.times) for shot in self.items])

@@ -136,9 +136,44 @@ def outdone_by(context: SearchContext, selection: SelectionResult, forms: FreeFo
         )
         rival = next(rivals, None)
     else:
-        rivals = (form for form in forms.alone if outdoes(form, named, forms.rough))
-        rival = next(rivals, None) or _another_law(context, named, forms)
+        rival = _outdoing(context, named, forms) or _another_law(context, named, forms)
     return None if rival is None else Outdone(effect, rival.place, is_in_its_place(effect, rival.place))
+
+
+def _outdoing(context: SearchContext, named: ScoredModel, forms: FreeForms) -> ScoredModel | None:
+    """Find the free form that outdoes a name.
+
+    One that closes little more than the name has to keep ahead when either has a second form beside it, the
+    name one in another place than its own: that may take what is no part of the law.
+    """
+    rivals = [form for form in forms.alone if outdoes(form, named, forms.rough)]
+    contested = [form for form in rivals if _is_contested(form, named, forms.rough)]
+    if not rivals or len(contested) < len(rivals):
+        return next((form for form in rivals if form not in contested), None)
+    seconds = _with_seconds(context, named, forms)
+    elsewhere = [one for one in seconds if not is_in_its_place(named.effect, one.place)]
+    best = max((named, *elsewhere), key=lambda one: one.score)
+    for form in contested:
+        rival = max((form, *_with_seconds(context, form, forms)), key=lambda one: one.score)
+        is_its_own = is_in_its_place(named.effect, form.place)
+        if rival.is_told_from(best) if is_its_own else rival.score >= best.score:
+            return form
+    return None
+
+
+def _is_contested(form: ScoredModel, named: ScoredModel, rough: Fit) -> bool:
+    """Whether it is open if a spline outdoes a name: not where it closes much more, or all from elsewhere."""
+    is_near = form.place in REMAINDER_FORMS and closes_enough(form, named, rough)
+    return is_near and (is_in_its_place(named.effect, form.place) or not form.leaves_nothing)
+
+
+def _with_seconds(context: SearchContext, model: ScoredModel, forms: FreeForms) -> list[ScoredModel]:
+    """Fit free forms beside a name or a form, those that promise most there."""
+    if model.effect:
+        problem, base = context.coarse.with_effects(model.fit.effects), model.fit
+    else:
+        problem, base = forms.terms[model.place].problem, forms.terms[model.place].fit
+    return with_second(context, problem, base, model.effect)
 
 
 def stands_beside(context: SearchContext, named: ScoredModel, forms: FreeForms) -> bool:
@@ -166,11 +201,10 @@ def _another_law(context: SearchContext, named: ScoredModel, forms: FreeForms) -
     form = next(ahead, None)
     if form is None:
         return None
-    problem, term = context.coarse.with_effects(named.fit.effects), forms.terms[form.place]
-    with_name = with_second(context, problem, named.fit, named.effect)
-    with_form = with_second(context, term.problem, term.fit, "")
-    best = max(with_name, key=lambda model: model.score, default=named)
-    rival = max(with_form, key=lambda model: model.score, default=form)
+    best, rival = (
+        max(_with_seconds(context, model, forms), key=lambda one: one.score, default=model)
+        for model in (named, form)
+    )
     return form if rival.is_told_from(best) else None
 
 
@@ -198,12 +232,17 @@ def outdoes(form: ScoredModel, named: ScoredModel, rough: Fit) -> bool:
     rough : Fit
         Model with neither, on the same samples.
     """
-    before = float(np.mean(rough.residual**2))
-    if before - named.mean_square < MIN_SHARE_OF_FREE * (before - form.mean_square):
+    if not closes_enough(form, named, rough):
         return True
     if is_in_its_place(named.effect, form.place):
         return not named.leaves_nothing and form.leaves_nothing and form.is_told_from(named)
     return form.is_told_from(named) if named.leaves_nothing else form.score >= named.score
+
+
+def closes_enough(form: ScoredModel, named: ScoredModel, rough: Fit) -> bool:
+    """Whether a name closes most of the squared gap that a free form closes."""
+    before = float(np.mean(rough.residual**2))
+    return before - named.mean_square >= MIN_SHARE_OF_FREE * (before - form.mean_square)
 
 
 def is_in_its_place(effect: str, place: str) -> bool:

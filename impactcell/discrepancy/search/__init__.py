@@ -31,6 +31,14 @@ from impactcell.discrepancy.search.context import Mapper, SearchContext
 from impactcell.discrepancy.search.evidence import ALPHA, CandidateScan, ModelEvidence, scan_candidates
 from impactcell.discrepancy.search.experiment_design import Proposal, propose_experiments
 from impactcell.discrepancy.search.gap import Gap, Part
+from impactcell.discrepancy.search.gap_measure import (
+    MAX_EXPECTED_GAP,
+    MAX_P_VALUE,
+    MIN_CLOSED_SHARE,
+    MIN_OPEN_GAP,
+    GapChange,
+    GapMeasure,
+)
 from impactcell.discrepancy.search.held_out import HeldOutOutcome, OpenedShots
 from impactcell.discrepancy.search.indistinguishability import CandidateFit, compare_fits
 from impactcell.discrepancy.search.model_error import (
@@ -44,15 +52,7 @@ from impactcell.discrepancy.search.open_loop import Simulation, SimulationError,
 from impactcell.discrepancy.search.policy import POLICY
 from impactcell.discrepancy.search.residual_map import ALL
 from impactcell.discrepancy.search.unexplained_gap import UnexplainedGap, describe_gap
-from impactcell.discrepancy.search.validation import (
-    MAX_EXPECTED_GAP,
-    MAX_P_VALUE,
-    MIN_CLOSED_SHARE,
-    MIN_OPEN_GAP,
-    GapChange,
-    GapMeasure,
-    Validation,
-)
+from impactcell.discrepancy.search.validation import Validation
 
 __all__ = [
     "ALL",

@@ -138,7 +138,8 @@ def accept_set(
     sets : sequence of CandidateFit
         Of one size.
     order : sequence of str
-        Single effects, the likeliest first: the one that would have come first is the first of the set.
+        Single effects, those fitted inside their range before others, the likeliest first: the one that would
+        have come first is the first of the set.
     scans : sequence of CandidateScan
         Of models with some effects: the p-value of an effect is that beside those before it, where that
         was scanned, else that against the nominal model.
@@ -147,7 +148,7 @@ def accept_set(
     """
     nominal, final = evidence
     best = sets[0].fit
-    if is_at_bound(best):
+    if is_at_bound(problem.shots, best):
         return reject(nominal, final, alternatives)
     place = {effect: index for index, effect in enumerate(order)}
     new_effects = best.effects[len(nominal.fit.effects) :]
@@ -180,7 +181,7 @@ def accept_plausible(
     rivals: whoever is behind by less than that is tied.
     """
     best = singles[0].fit
-    if context.floor_is_certain or is_at_bound(best):
+    if context.floor_is_certain or is_at_bound(context.problem.shots, best):
         return None
     shots, coarse = context.problem.shots, context.coarse.shots
     size = shots.values.size

@@ -21,6 +21,7 @@ from impactcell.discrepancy.search.acceptance import SelectionResult
 from impactcell.discrepancy.search.candidate_fits import FitTask, run_tasks
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.evidence import ALPHA, ModelEvidence
+from impactcell.discrepancy.search.factor_likeness import fits_to_factors
 from impactcell.discrepancy.search.gap import narrows
 from impactcell.discrepancy.search.indistinguishability import CandidateFit, compare_fits, widest_rival
 from impactcell.discrepancy.search.model_error import shared_error
@@ -67,7 +68,11 @@ def accept_between_shots(
     if p_value > POLICY.between_shots_error or not narrows(nominal.spread, best.spread, context.gap(best)):
         return None
     shots = context.problem.count
+    # Of an effect that was fitted to the traces, too, the fit to the factors comes into question here.
+    to_factors = {fit.effects[-1]: fit for fit in fits_to_factors(context, nominal, best)}
+    rivals = [rival for rival in rivals if rival.effects[-1] not in to_factors]
     in_traces, explained = trace_rivals(best.spread, rivals, shots)
+    fitted = [*to_factors.values(), *(fit for fit in fitted if fit.effects[-1] not in to_factors)]
     alike = factor_rivals(best, fitted, shots)
     if explained or alike is None:
         return None

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from impactcell.discrepancy.data import ShotSet
 from impactcell.discrepancy.model import Fit, Problem, fit
 from impactcell.discrepancy.search import candidate_scores
 from impactcell.discrepancy.search.context import SearchContext
@@ -19,7 +20,7 @@ from impactcell.discrepancy.search.indistinguishability import (
 )
 from impactcell.discrepancy.search.policy import POLICY
 from impactcell.errors import DiscrepancyError
-from impactcell.physics import Kind
+from impactcell.physics import Kind, ParameterKind
 from impactcell.physics.effects import LIBRARY
 from impactcell.records import Samples
 
@@ -65,29 +66,53 @@ class FitTask:
             return None
 
 
-def is_at_bound(model: Fit) -> bool:
-    """Whether the shape of an effect was fitted to the end of its range.
+def is_at_bound(shots: ShotSet, model: Fit) -> bool:
+    """Whether the shape of an effect was fitted to the end of its range, or to where no shot has been.
 
-    It is then used for something that it is not: a patch wider than any slide is a gradient of friction.
+    It is then used for something that it is not: a patch wider than any slide, or far beyond its end, is a
+    gradient of friction, and so is a wave of less than half a period.
     """
-    return any(
-        coordinate.effect
-        and coordinate.form == "log"
-        and min(float(theta) - coordinate.lower, coordinate.upper - float(theta))
-        < POLICY.bound_share * (coordinate.upper - coordinate.lower)
-        for coordinate, theta in zip(model.coordinates, model.theta, strict=True)
-    )
+    low, high = shots.visited_m
+    span = high - low
+    for coordinate, theta in zip(model.coordinates, model.theta.tolist(), strict=True):
+        if not coordinate.effect or coordinate.definition is None:
+            continue
+        kind, value = coordinate.definition.kind, coordinate.value(theta)
+        is_unseen = {
+            ParameterKind.POSITION: not low <= value <= high,
+            ParameterKind.WIDTH: value > span,
+            ParameterKind.PERIOD: value > 2.0 * span,
+        }.get(kind, False)
+        nearest = min(theta - coordinate.lower, coordinate.upper - theta)
+        is_at_end = coordinate.form == "log" and nearest < POLICY.bound_share * (
+            coordinate.upper - coordinate.lower
+        )
+        if is_at_end or (is_unseen and span > 0.0):
+            return True
+    return False
 
 
-def prefer_interior(problem: Problem, ranking: list[CandidateFit]) -> list[CandidateFit]:
-    """Put what is tied with the likeliest, and fitted inside its range, before a likeliest that is not."""
-    if not ranking or not is_at_bound(ranking[0].fit):
+def prefer_interior(problem: Problem, nominal: Fit, ranking: list[CandidateFit]) -> list[CandidateFit]:
+    """Put what is fitted inside its range before a likeliest that is not, if it is tied with that.
+
+    Or, alone beside the nominal model, if it leaves more by a small part of the gap at most: what a shape at
+    its end makes of the rest is no name.
+    """
+    if not ranking or not is_at_bound(problem.shots, ranking[0].fit):
         return ranking
-    inside = [
-        candidate
-        for candidate in ranking[1:]
-        if not is_at_bound(candidate.fit) and are_indistinguishable(problem, ranking[0], candidate)
-    ]
+    best = ranking[0].fit
+    squares = {id(one): float(one.residual @ one.residual) for one in (nominal, *(c.fit for c in ranking))}
+    gap = squares[id(nominal)] - squares[id(best)]
+    is_single = len(best.effects) == len(nominal.effects) + 1
+
+    def comes_first(candidate: CandidateFit) -> bool:
+        lead = squares[id(candidate.fit)] - squares[id(best)]
+        return not is_at_bound(problem.shots, candidate.fit) and (
+            are_indistinguishable(problem, ranking[0], candidate)
+            or (is_single and lead <= POLICY.max_bound_lead * gap)
+        )
+
+    inside = [candidate for candidate in ranking[1:] if comes_first(candidate)]
     return [*inside, *(candidate for candidate in ranking if candidate not in inside)]
 
 
@@ -132,15 +157,17 @@ def run_tasks(context: SearchContext, tasks: Sequence[FitTask]) -> list[Fit]:
 
 
 def finalists(context: SearchContext, rough: list[Fit]) -> list[Fit]:
-    """Keep the likeliest, and those that fewer samples do not tell from it."""
+    """Keep the likeliest, as many inside their range, and those that fewer samples do not tell from it."""
     in_sample = [
         CandidateFit(candidate, candidate.log_likelihood(context.coarse.shots))
         for candidate in rough[: POLICY.max_finalists]
     ]
+    inside = [one for one in in_sample if not is_at_bound(context.coarse.shots, one.fit)]
+    kept = [*in_sample[: POLICY.min_finalists], *inside[: POLICY.min_finalists]]
     return [
         candidate.fit
-        for place, candidate in enumerate(in_sample)
-        if place < POLICY.min_finalists or are_indistinguishable(context.coarse, in_sample[0], candidate)
+        for candidate in in_sample
+        if candidate in kept or are_indistinguishable(context.coarse, in_sample[0], candidate)
     ]
 
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from impactcell.discrepancy.data import MIN_HELD_OUT, MIN_TRAINING
 from impactcell.discrepancy.search.acceptance import SelectionResult
 from impactcell.discrepancy.search.evidence import ALPHA, ModelEvidence
+from impactcell.discrepancy.search.gap_measure import MIN_OPEN_GAP
 from impactcell.discrepancy.search.residual_map import ALL
-from impactcell.discrepancy.search.validation import MIN_OPEN_GAP, Validation
+from impactcell.discrepancy.search.validation import Validation
 
 # Verdicts, as `result.json` has them.
 NO_GAP, NAMED, TIED, UNKNOWN, UNTESTED = "no_gap", "named", "tied", "unknown", "untested"

@@ -6,7 +6,8 @@ from itertools import takewhile
 
 from impactcell.discrepancy.model import Fit
 from impactcell.discrepancy.search.gap import Part
-from impactcell.discrepancy.search.validation import MAX_P_VALUE, GapChange, GapMeasure, counted_parts
+from impactcell.discrepancy.search.gap_measure import MAX_P_VALUE, GapChange, GapMeasure
+from impactcell.discrepancy.search.validation import counted_parts
 
 VISIBLE_BESIDE = 1.2
 """Gap of the traces [noise floors] that others must leave without an effect for it to have a name beside

@@ -12,8 +12,10 @@ from impactcell.discrepancy.data import (
     replicate_spread,
 )
 from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
+from impactcell.discrepancy.search.candidate_fits import is_at_bound
 from impactcell.discrepancy.search.confirmation import NestedModels, confirmed
-from impactcell.discrepancy.search.validation import MAX_P_VALUE, GapMeasure, Validation, counted_parts
+from impactcell.discrepancy.search.gap_measure import MAX_P_VALUE, GapMeasure
+from impactcell.discrepancy.search.validation import Validation, counted_parts
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +61,8 @@ class OpenedShots:
     def validate(self, nested: NestedModels, max_p: float = MAX_P_VALUE) -> HeldOutOutcome:
         """Add effects to the nominal model as long as held-out shots confirm them.
 
+        None where what they confirm by itself is no name: a shape at the end of its range.
+
         Parameters
         ----------
         nested : NestedModels
@@ -75,6 +79,8 @@ class OpenedShots:
         changes = confirmed(
             measure, held_nested, max_p, lambda effects: training.gap(nested.models[effects]).trace
         )
+        if is_at_bound(problem.shots, nested.models[frozenset(changes)]):
+            changes = {}
         nominal, held_nominal = nested.nominal, held_nested.nominal
         final, held_final = nested.models[frozenset(changes)], held[frozenset(changes)]
         parts = counted_parts(measure, (held_nominal, held_final), changes.values())

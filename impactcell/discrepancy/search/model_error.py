@@ -44,13 +44,16 @@ class ModelError:
         Sum of squared residuals beyond those of the noise [squared noise floors], all shots.
     level : float
         RMS of what is left beside the noise [1 = noise floor].
+    pieces_of_shot : float
+        Samples of a shot over the integral of their correlation.
     pieces : float
-        Independent pieces: samples of a shot over the integral of their correlation, times the patterns in
-        which what is left differs from shot to shot.
+        Independent pieces: those of a shot times the patterns in which what is left differs from shot to
+        shot.
     """
 
     excess: float
     level: float
+    pieces_of_shot: float
     pieces: float
 
 
@@ -78,8 +81,9 @@ def estimate_model_error(problem: Problem, model: Fit) -> ModelError:
     correlation = products / np.maximum(counts, 1.0)
     excess = float(products[0]) - shots.values.size
     samples = shots.values.size / problem.count
-    pieces = max(samples / _integral(correlation), MIN_PIECES) * _patterns(model.residual, problem)
-    return ModelError(excess, math.sqrt(max(excess, 0.0) / shots.values.size), pieces)
+    pieces = max(samples / _integral(correlation), MIN_PIECES)
+    level = math.sqrt(max(excess, 0.0) / shots.values.size)
+    return ModelError(excess, level, pieces, pieces * _patterns(model.residual, problem))
 
 
 def share_p_value(before: float, left: ModelError, parameters: int) -> float:

@@ -20,7 +20,12 @@ from impactcell.discrepancy.search.acceptance import (
     reject,
 )
 from impactcell.discrepancy.search.between_shots import accept_between_shots
-from impactcell.discrepancy.search.candidate_fits import fit_alike, fit_all_samples, without_each_effect
+from impactcell.discrepancy.search.candidate_fits import (
+    fit_alike,
+    fit_all_samples,
+    is_at_bound,
+    without_each_effect,
+)
 from impactcell.discrepancy.search.confirmation import NestedModels
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.convergence import converge
@@ -201,7 +206,9 @@ def _each_earns(context: SearchContext, state: SearchState, size: int) -> bool:
 
 def _accept(context: SearchContext, state: SearchState, size: int) -> SearchState:
     """Accept the best set of a size."""
-    order = [model.effects[-1] for model in state.rough[1]]
+    order = [
+        model.effects[-1] for model in sorted(state.rough[1], key=partial(is_at_bound, context.coarse.shots))
+    ]
     evidence = (state.tested[0], state.tested[size])
     result = accept_set(context.problem, evidence, state.sets[size], order, state.scans, state.alternatives)
     return replace(state, result=result)

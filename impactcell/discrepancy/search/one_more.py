@@ -177,7 +177,7 @@ def merge(context: SearchContext, state: SearchState, size: int, fits: Sequence[
         if known is None or _gain(context, known.fit, one.fit) > POLICY.min_refit_gain:
             by_set[frozenset(one.fit.effects)] = one
     ranked = sorted(by_set.values(), key=lambda one: (-float(one.each.sum()), one.fit.effects))
-    return replace(state, sets=state.sets | {size: prefer_interior(context.problem, ranked)})
+    return replace(state, sets=state.sets | {size: prefer_interior(context.problem, state.nominal, ranked)})
 
 
 def _gain(context: SearchContext, before: Fit, after: Fit) -> float:
