@@ -26,8 +26,8 @@ and half of the error of a step is 0.005."""
 MIN_HELD_OUT = 5
 """Held-out shots or blocks that can say a gap falls: with the signs of n at random p is 2^-n at best."""
 DIVISIONS, MOST_ALIKE = 400, 20
-"""Divisions that are drawn, and of how many of them one has held-out shots that are alike enough [1]: of these
-the first is taken, so that it is left to chance which."""
+"""Divisions that are drawn, and of how many of them one has held-out shots that are alike enough [1]: of
+these the first is taken, so that it is left to chance which."""
 
 NO_DRIVE = np.empty((2, 0))
 """Drive of a part that is not driven."""
