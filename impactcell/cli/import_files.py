@@ -32,7 +32,7 @@ class ImportOptions:
     Attributes
     ----------
     said : mapping
-        Lists of `NAME=VALUE` by `columns`, `units`, `gains`, `signs` and `constants`.
+        Lists of `NAME=VALUE` by `columns`, `units`, `gains`, `signs`, `delays` and `constants`.
     mapping : Path or None
         YAML that says the same; the command line goes before it.
     dialect : Dialect

@@ -28,13 +28,19 @@ def import_files(
         ),
     ] = None,
     sign: Annotated[list[str] | None, typer.Option(metavar="QUANTITY=+1|-1", help="Turn a channel.")] = None,
+    delay: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="QUANTITY=TIME", help="How much too late a channel was recorded: position=0.5ms."
+        ),
+    ] = None,
     constant: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="For all shots: mass=18.9kg, say.")
     ] = None,
     mapping: Annotated[
         Path | None,
         typer.Option(
-            metavar="MAP.yaml", help="Says the same in blocks columns, units, gains, signs, constants."
+            metavar="MAP.yaml", help="Says the same: columns, units, gains, signs, delays, constants."
         ),
     ] = None,
     excitation: Annotated[str | None, typer.Option(help="tap, free_slide or driven.")] = None,
@@ -55,6 +61,7 @@ def import_files(
         "units": unit or (),
         "gains": gain or (),
         "signs": sign or (),
+        "delays": delay or (),
         "constants": constant or (),
     }
     options = ImportOptions(said, mapping, named_dialect(delimiter, decimal, encoding), excitation, trigger)

@@ -31,7 +31,11 @@ OTHERS = (ColumnMeaning.COVARIATE, ColumnMeaning.IGNORED)
 """What several columns can be: said once for each, or as a list in a file."""
 _MARK = " and a decimal point, without separators of thousands"
 """What a number with a comma may have meant otherwise."""
-SECTIONS = ("columns", "units", "gains", "signs", "constants")
+_WITH_UNIT = re.compile(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(.*)")
+"""A number, and whatever is its unit."""
+LONGEST_DELAY_S = 1.0
+"""Longest time [s] that a channel may be moved: beyond it the channels are of different events."""
+SECTIONS = ("columns", "units", "gains", "signs", "delays", "constants")
 """Blocks of a mapping file; beside them `excitation` and `trigger`."""
 
 
@@ -78,6 +82,11 @@ def read_given(
             q: gain
             for key, text in sections.get("gains", {}).items()
             if (q := _quantity(key, faults)) and (gain := _gain(q, text, faults))
+        },
+        {
+            q: _delay(q, text, faults)
+            for key, text in sections.get("delays", {}).items()
+            if (q := _quantity(key, faults))
         },
     )
     if faults:
@@ -144,6 +153,25 @@ def _sign(key: str, text: str, faults: list[str]) -> int:
     return 1
 
 
+def _delay(quantity: ColumnMeaning, text: str, faults: list[str]) -> float:
+    if quantity not in CHANNELS:
+        faults.append(f"{quantity} cannot be moved; a delay is of {', '.join(CHANNELS)}")
+        return 0.0
+    match = _WITH_UNIT.fullmatch(text)
+    value = parse_number(match.group(1)) if match else None
+    unit = parse_unit(match.group(2)) if match else None
+    if value is None or unit is None or unit.dimension is not Dimension.TIME or not math.isfinite(value):
+        mark = _MARK if "," in text else ""
+        faults.append(
+            f"the delay of {quantity} is {text!r}; write it with its unit{mark}, as {quantity}=0.5 ms"
+        )
+        return 0.0
+    delay = value * unit.factor
+    if abs(delay) > LONGEST_DELAY_S:
+        faults.append(f"the delay of {quantity} is {text!r}; more than {LONGEST_DELAY_S:g} s is no delay")
+    return delay
+
+
 def _gain(quantity: ColumnMeaning, text: str, faults: list[str]) -> Gain | None:
     if quantity not in CHANNELS:
         faults.append(f"{quantity} has no gain; one is of {', '.join(CHANNELS)}")
@@ -184,7 +212,7 @@ def _constant(key: str, text: str, faults: list[str]) -> float:
         faults.append(f"{key!r} cannot be set; known: {', '.join(CONSTANTS)}")
         return math.nan
     dimensions, example = CONSTANTS[key]
-    match = re.fullmatch(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(.*)", text)
+    match = _WITH_UNIT.fullmatch(text)
     value = parse_number(match.group(1)) if match else None
     unit = parse_unit(match.group(2) or "1") if match else None
     if value is None or unit is None or unit.dimension not in dimensions or not math.isfinite(value):

@@ -58,6 +58,8 @@ class Given:
         Columns that are covariates or ignored, by their names.
     gains : mapping
         What the signal in the column of a channel stands for.
+    delays : mapping
+        How much later than it happened a channel was recorded [s].
     """
 
     columns: AbstractMapping[ColumnMeaning, str] = field(default_factory=dict)
@@ -68,6 +70,7 @@ class Given:
     constants: AbstractMapping[str, float] = field(default_factory=dict)
     others: AbstractMapping[str, ColumnMeaning] = field(default_factory=dict)
     gains: AbstractMapping[ColumnMeaning, Gain] = field(default_factory=dict)
+    delays: AbstractMapping[ColumnMeaning, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,9 +148,10 @@ def _without_use(assignments: Sequence[Assignment], given: Given, tables: Sequen
     """Tell what was given and would change nothing: who gave it believes that it counts."""
     columns = {item.meaning: item.column for item in assignments}
     faults = [
-        f"a sign of the {meaning} was given, and no column is the {meaning}; name it with --column "
-        f"{meaning}=NAME, or take the sign away"
-        for meaning in given.signs
+        f"a {what} of the {meaning} was given, and no column is the {meaning}; name it with --column "
+        f"{meaning}=NAME, or take the {what} away"
+        for what, said in (("sign", given.signs), ("delay", given.delays))
+        for meaning in said
         if meaning not in columns
     ]
     time = columns.get(ColumnMeaning.TIME)

@@ -148,7 +148,7 @@ def _record(table: Table, place: str, mapping: Mapping, faults: list[str]) -> Re
         elif not present.any():
             faults.append(f"{table.title}: column {column.name!r} ({meaning}) has no value at all")
         else:
-            times[meaning] = time[present]
+            times[meaning] = time[present] - mapping.given.delays.get(meaning, 0.0)
             measured = item.unit.factor * mapping.given.signs.get(meaning, 1) * column.values[present]
             values[meaning] = _summed_up(times[meaning], measured) if item.summed_up else measured
     return Record(place, times, values, scalars_of(table, place, mapping, faults))

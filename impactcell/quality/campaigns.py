@@ -91,7 +91,7 @@ def _late(shots: Sequence[Capture]) -> list[DataFault]:
     told = (
         f"the {which} is recorded {1e3 * abs(middle):.2g} ms after the {other} ({len(known)} shots): "
         f"check filters and "
-        f"the clock of that channel before a law is blamed"
+        f"the clock of that channel before a law is blamed (impactcell import --delay moves it)"
     )
     return [DataFault(Fault.LATE_CHANNEL, which, told)]
 

@@ -349,6 +349,7 @@ def test_columns_are_left_out_or_kept_as_covariates(tmp_path: Path) -> None:
         ("columns: {covariate: [[p]]}\n", "map.yaml:1:11: columns.covariate has to be a text or a number"),
         ("columns:\n  force:\n", "map.yaml:2:3: columns.force has to be a text or a number"),
         ("units: {x: [mm]}\n", "map.yaml:1:9: units.x has to be a text or a number"),
+        ("delays: [1 ms]\n", "map.yaml:1:1: delays has to be a block of `name: value`"),
         ("signs: 3\n", "map.yaml:1:1: signs has to be a block of `name: value`"),
         ("units: {x: !!timestamp 2026-13-45}\n", "map.yaml:1:12: '2026-13-45' cannot be read as timestamp"),
         ("", "map.yaml:1:1: the file is empty"),

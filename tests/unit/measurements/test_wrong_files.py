@@ -31,6 +31,7 @@ def text(head: str = "time_s,force_n,position_m", further: object = None, before
 
 def run(tmp_path: Path, content: str | bytes, *options: str, name: str = "a.csv") -> Path:
     file = tmp_path / name
+    tmp_path.mkdir(exist_ok=True)
     file.write_bytes(content.encode() if isinstance(content, str) else content)
     with contextlib.suppress(SystemExit):
         run_verb(["import", str(file), "-o", str(tmp_path / "out"), *options])
@@ -75,6 +76,13 @@ HEAD = "time_s,force_n,position_m"
         (text(), (*VELOCITY, "--column", "force=force", "--column", "position=force"), "as force and as pos"),
         (text(), (*VELOCITY, "--column", "force=force", "--column", "ignored=force"), "as force and as ign"),
         (text(), (*VELOCITY, "--sign", "time=-1"), "time cannot be turned; a sign is of force, posi"),
+        (text(), (*VELOCITY, "--delay", "time=1ms"), "time cannot be moved; a delay is of force, posi"),
+        (text(), (*VELOCITY, "--delay", "force=1"), "the delay of force is '1'; write it with its unit, as"),
+        (text(), (*VELOCITY, "--delay", "force=0,5 ms"), "with its unit and a decimal point, without sep"),
+        (text(), (*VELOCITY, "--delay", "force=5 mm"), "the delay of force is '5 mm'; write it with its"),
+        (text(), (*VELOCITY, "--delay", "force=3 s"), "'3 s'; more than 1 s is no delay"),
+        (text(), (*VELOCITY, "--delay", "force=1e999 ms"), "the delay of force is '1e999 ms'; write it"),
+        (text(), (*VELOCITY, "--delay", "kraft=1 ms"), "'kraft' is no quantity; known:"),
         (text(), ("--encoding", "undefined"), "a.csv: is not undefined; give the file's encoding"),
         (text("force_n,position_m,x_v", before="sample rate: nan"), VELOCITY, "no column of time was found;"),
         (text("force_n,position_m,x_v", before="dt: 1e400 s"), VELOCITY, "no column of time was found;"),
@@ -126,6 +134,35 @@ def test_a_rate_counts_for_the_files_that_have_no_time(tmp_path: Path) -> None:
 def test_a_sign_of_what_was_not_recorded_is_refused(tmp_path: Path) -> None:
     told = refused(tmp_path, text(), *VELOCITY, "--sign", "actuator=-1")
     assert "no column is the actuator; name it with --column actuator=NAME, or take the sign away" in told
+    told = refused(tmp_path, text(), *VELOCITY, "--delay", "actuator=1 ms")
+    assert "name it with --column actuator=NAME, or take the delay away" in told
+
+
+def test_a_late_channel_is_moved_back_to_when_it_happened(tmp_path: Path) -> None:
+    step, late = float(np.diff(TIME)[0]), 7
+    moved = np.concatenate([np.full(late, PLACE[0]), PLACE[:-late]])
+    rows = [f"{t:.6g},{f:.6g},{x:.7g}" for t, f, x in zip(TIME, FORCE, moved, strict=True)]
+    content = "\n".join([HEAD, *rows]) + "\n"
+    delay = f"{1e3 * late * step:.6g} ms"
+    (as_it_was,) = campaign.read(run(tmp_path / "one", text(), *VELOCITY)).shots
+    (put_right,) = campaign.read(
+        run(tmp_path / "two", content, *VELOCITY, "--delay", f"position={delay}")
+    ).shots
+    (tmp_path / "map.yaml").write_text(f"delays: {{position: {delay}}}\n", encoding="utf-8")
+    (by_file,) = campaign.read(
+        run(tmp_path / "three", content, *VELOCITY, "--mapping", str(tmp_path / "map.yaml"))
+    ).shots
+    for shot in (put_right, by_file):
+        assert np.array_equal(shot.force.time_s, as_it_was.force.time_s)
+        both = [
+            (shot.position.time_s, shot.position.values),
+            (as_it_was.position.time_s, as_it_was.position.values),
+        ]
+        (time, values), (expected_time, expected) = both
+        assert time[0] == pytest.approx(expected_time[0] - late * step, abs=1e-9)
+        np.testing.assert_allclose(
+            np.interp(expected_time[:-late], time, values), expected[:-late], atol=1e-7
+        )
 
 
 def test_what_counts_for_taps_alone_is_told_where_there_are_none(
