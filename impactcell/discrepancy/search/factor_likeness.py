@@ -10,8 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from impactcell.discrepancy.model import Fit, Problem, effect_coordinates, refit_shot_parameters
-from impactcell.discrepancy.model.shot_fits import shot_equations
+from impactcell.discrepancy.model import (
+    Fit,
+    Problem,
+    effect_coordinates,
+    normal_equations,
+    refit_shot_parameters,
+)
 from impactcell.discrepancy.search.candidate_scores import effect_direction, start_coordinates, visited_range
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.effect_grid import GridPoint, effect_grid
@@ -80,6 +85,6 @@ def _fit_to_factors(problem: Problem, nominal: Fit, effect: str, point: GridPoin
 def _response(problem: Problem, nominal: Fit, change: Samples) -> Samples:
     """How far each shot's friction factor goes to follow a change of the prediction, shape (n,)."""
     model, state = problem.with_effects(nominal.effects), nominal.state
-    along = np.add.reduceat(model.shot_jacobian(state) * change, problem.shots.bounds[:-1], axis=1)
-    steps: Samples = np.einsum("iqr,ri->iq", shot_equations(model, state).inverse, along)
+    equations = normal_equations(model, change[None], model.shot_jacobian(state), state)[2]
+    steps: Samples = np.einsum("iqr,ir->iq", equations.inverse, equations.cross[:, :, 0])
     return steps[:, 0]
