@@ -43,12 +43,12 @@ def _investigated(hidden: tuple[str, ...], multiples: tuple[float, ...], seed: i
 @pytest.mark.long
 def test_an_effect_is_named_and_measured_beside_a_force_of_which_nobody_knows_the_form() -> None:
     strength = 1.0
-    found = _investigated(("force_sensor_gain", "wandering_force"), (strength, 0.15), 600_000)
+    found = _investigated(("force_sensor_gain", "wandering_force"), (strength, 0.15), 600_001)
     assert found.added == ("force_sensor_gain",)
     assert found.verdict == "named"
     assert not found.conclusion.remaining.explained
     assert found.validation.gap_after < found.validation.gap_before
-    truth = strengths("force_sensor_gain", strength, 600_000)["relative_error"]
+    truth = strengths("force_sensor_gain", strength, 600_001)["relative_error"]
     (alone,) = (one for one in found.parameters if one.effect)
     (beside,) = (one for one in found.stated_parameters if one.effect)
     told = result_document(found)["effects"][0]["parameters"]["relative_error"]

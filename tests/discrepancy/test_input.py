@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -116,7 +117,8 @@ def test_a_shot_without_force_among_others_is_used_all_the_same() -> None:
     part = changed(given, lambda shot: replace(shot, force=None) if shot.cycle % 3 == 0 else shot)
     found = investigate(part)
     assert found.verdict == "no_gap"
-    assert found.validation.held_out.before.trace == pytest.approx(1.0, abs=0.04)
+    scatter = 1.0 / math.sqrt(2.0 * found.held_problem.shots.values.size)
+    assert found.validation.held_out.before.trace == pytest.approx(1.0, abs=4.0 * scatter)
 
 
 def test_without_positions_the_loss_of_power_is_said() -> None:

@@ -282,7 +282,7 @@ def test_the_range_expected_without_a_gap_holds_the_gaps_of_noise(viscous: Discr
     measure = replace(measure_of(viscous), replicates=replicates)
     size, count = viscous.held_final.residual.size, viscous.held_problem.count
     inside = []
-    for _ in range(400):
+    for _ in range(1600):
         shots = replace(
             viscous.held_final.shot_parameters,
             log_factor=0.01 * rng.standard_normal(count) / math.sqrt(rng.chisquare(12) / 12),
