@@ -43,7 +43,8 @@ MESSAGES: Final[Sequence[tuple[str, str | Callable[[re.Match[str]], str]]]] = (
      r"das Teil gleitet nie: es bewegt sich um \1 \2 und federt zurück (Vorgleiten); stärker stoßen"),
     (r"the (\w+) is recorded (\S+) ms after the (\w+) \((\d+) shots\): .*",
      lambda m: f"{CHANNELS[m[1]]} ist {m[2]} ms später aufgezeichnet als {CHANNELS[m[3]]} ({m[4]} Stöße): "
-     "Filter und Uhr dieses Kanals prüfen, bevor ein Gesetz schuld ist"),
+     "Filter und Uhr dieses Kanals prüfen, bevor ein Gesetz schuld ist (impactcell import --delay verschiebt "
+     "ihn)"),
     (r"the force at rest goes from (\S+) N to (\S+) N over (\d+) shots: .*",
      r"die Kraft in Ruhe geht von \1 N auf \2 N über \3 Stöße: Sensor tarieren, warm werden lassen"),
 )  # fmt: skip

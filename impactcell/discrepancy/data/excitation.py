@@ -6,6 +6,7 @@ module tells them apart.
 
 import math
 from abc import ABC, abstractmethod
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
@@ -119,29 +120,13 @@ class ExcitationStrategy(ABC):
         tap among it: what only hard taps show must be in both parts.
         """
         rng = np.random.default_rng([seed, 1])
-        divisions = [self._division(shots, rng) for _ in range(DIVISIONS if len(shots) > 1 else 1)]
-        features = _features(shots)
+        settings = [_setting(shot) for shot in shots]
+        divisions = [_draw_held_out(settings, rng) for _ in range(DIVISIONS)]
+        features = _features(shots, settings)
         distance = np.array([np.sum(features[held].mean(0) ** 2) for held in divisions])
-        nearest = np.argsort(distance, kind="stable")[: max(len(divisions) // MOST_ALIKE, 1)]
+        nearest = np.argsort(distance, kind="stable")[: DIVISIONS // MOST_ALIKE]
         held_out = divisions[int(nearest.min())]
         return np.setdiff1d(np.arange(len(shots)), held_out), held_out
-
-    def _division(self, shots: Sequence[PreparedShot], rng: np.random.Generator) -> IndexArray:
-        """Draw held-out shots, a quarter of each velocity and direction."""
-        n = len(shots)
-        order = rng.permutation(n)
-        strata = [_stratum(shot) for shot in shots]
-        # Round after round one shot of every stratum, at evenly spread shares of it: the quarter with the
-        # smallest shares is a quarter of each.
-        rank = np.empty(n, dtype=np.int64)
-        count_of_stratum: dict[tuple[float, float], int] = {}
-        for index in order.tolist():
-            rank[index] = count_of_stratum.get(strata[index], 0)
-            count_of_stratum[strata[index]] = int(rank[index]) + 1
-        count = np.array([count_of_stratum[stratum] for stratum in strata])
-        share = (rank + rng.random(n)) / count
-        wanted = max(round(HELD_OUT_SHARE * n), min(MIN_HELD_OUT, n - MIN_TRAINING), 1)
-        return np.sort(np.lexsort((order, share))[:wanted])
 
     def reduce(
         self, items: tuple[PreparedShot, ...], every: tuple[PreparedShot, ...], gravity_m_s2: float,
@@ -182,8 +167,33 @@ class ExcitationStrategy(ABC):
         return []
 
 
-def _features(shots: Sequence[PreparedShot]) -> Samples:
-    """List how shots differ from those of their velocity and direction, of variance 1, shape (n, features).
+Setting = tuple[float, float]
+"""Velocity and direction of a shot: each is held out in its share."""
+
+
+def _setting(shot: PreparedShot) -> Setting:
+    velocity = shot.velocity_m_s if math.isfinite(shot.velocity_m_s) else 0.0
+    return (velocity, float(shot.direction))
+
+
+def _draw_held_out(settings: Sequence[Setting], rng: np.random.Generator) -> IndexArray:
+    """Draw held-out shots, a quarter of each setting."""
+    n = len(settings)
+    order = rng.permutation(n)
+    # Round after round one shot of every setting, at evenly spread shares of it: the quarter with the
+    # smallest shares is a quarter of each.
+    rank = np.empty(n, dtype=np.int64)
+    drawn: Counter[Setting] = Counter()
+    for index in order.tolist():
+        rank[index] = drawn[settings[index]]
+        drawn[settings[index]] += 1
+    share = (rank + rng.random(n)) / np.array([drawn[setting] for setting in settings])
+    wanted = max(round(HELD_OUT_SHARE * n), min(MIN_HELD_OUT, n - MIN_TRAINING), 1)
+    return np.sort(np.lexsort((order, share))[:wanted])
+
+
+def _features(shots: Sequence[PreparedShot], settings: Sequence[Setting]) -> Samples:
+    """List how shots differ from those of their setting, of variance 1, shape (n, features).
 
     Places in the order of each covariate and of the energy of a tap, and whether that is of the largest
     quarter. Shots that are alone in their setting are held against each other.
@@ -194,16 +204,11 @@ def _features(shots: Sequence[PreparedShot]) -> Samples:
     columns = [rankdata(np.nan_to_num(column)) for column in columns]
     columns.append((columns[-1] > (1.0 - HELD_OUT_SHARE) * len(shots)).astype(np.float64))
     deviation = np.array(columns).T
-    strata = [_stratum(shot) for shot in shots]
-    alone = np.array([strata.count(stratum) == 1 for stratum in strata])
-    groups = [np.array([stratum == one for one in strata]) & ~alone for stratum in {*strata}]
-    for group in (alone, *groups):
-        deviation[group] -= deviation[group].mean(0) if group.any() else 0.0
+    places = defaultdict[Setting | None, list[int]](list)
+    for place, setting in enumerate(settings):
+        places[setting if settings.count(setting) > 1 else None].append(place)
+    for alike in places.values():
+        deviation[alike] -= deviation[alike].mean(0)
     size = deviation.std(0)
     features: Samples = deviation[:, size > 0.0] / size[size > 0.0]
     return features
-
-
-def _stratum(shot: PreparedShot) -> tuple[float, float]:
-    velocity = shot.velocity_m_s if math.isfinite(shot.velocity_m_s) else 0.0
-    return (velocity, float(shot.direction))

@@ -182,8 +182,7 @@ def stands_beside(context: SearchContext, named: ScoredModel, forms: FreeForms) 
     gap = float(np.mean(forms.rough.residual**2)) - 1.0
     if alone.mean_square - named.mean_square < MIN_SHARE_BESIDE * gap:
         return False
-    term = forms.terms[named.place]
-    seconds = with_second(context, term.problem, term.fit, "")
+    seconds = _with_seconds(context, alone, forms)
     return not any(
         form.score >= named.score for form in seconds if not is_in_its_place(named.effect, form.place)
     )
