@@ -18,6 +18,7 @@ from impactcell.campaign import Campaign, Coordinate, Excitation, write
 from impactcell.cli.app import app
 from impactcell.discrepancy.machine import (
     BaseModel,
+    FallOfGap,
     MachineFinding,
     NumberPrior,
     OpenLoopError,
@@ -116,6 +117,36 @@ def test_a_place_that_holds_is_not_lost_to_one_that_helps_in_a_single_block(
     assert law is not None
     assert law.place == "law_of_friction_over_position"
     assert law.rival_places == ("law_of_friction_over_speed",)
+
+
+def test_where_held_out_blocks_do_not_confirm_the_best_place_the_next_is_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of speed the held-out blocks know nothing, whatever the others say; the error is shared by two."""
+    best_spline, fall_of_gap = law_search.best_spline, law_search.fall_of_gap
+    p_values: list[float] = []
+
+    def misleading(*given: Any) -> FreeSpline:
+        spline = best_spline(*given)
+        if spline.form != "friction_over_speed":
+            return spline
+        return replace(spline, gains=1e3 + np.arange(spline.gains.size))
+
+    def with_p_value(*given: Any) -> FallOfGap:
+        fall = fall_of_gap(*given)
+        return replace(fall, p_value=p_values[-1]) if fall.low > 0.0 else fall
+
+    monkeypatch.setattr(law_search, "best_spline", misleading)
+    monkeypatch.setattr(law_search, "fall_of_gap", with_p_value)
+    p_values.append(0.045)
+    law = investigate_machine(slide(0.6), SLIDE).law
+    assert law is not None
+    assert law.place == "law_of_friction_over_position"
+    assert law.rival_places == ("law_of_friction_over_speed",)
+    p_values.append(0.055)
+    finding = investigate_machine(slide(0.6), SLIDE)
+    assert finding.law is None
+    assert finding.law_refused == "on held-out blocks the gap does not fall by more than chance"
 
 
 def test_no_law_is_looked_for_where_nothing_remains() -> None:

@@ -4,12 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from impactcell.discrepancy.machine.base_model import TermChoice
-from impactcell.discrepancy.machine.delay import (
-    blamed_on_delay,
-    delay_note,
-    explained_by_delay,
-    told_from_delay,
-)
 from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
 from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine
 from impactcell.discrepancy.machine.machine_fits import MachineFits
@@ -18,6 +12,13 @@ from impactcell.discrepancy.machine.record_constants import constants_note
 from impactcell.discrepancy.machine.regression import Blocks
 from impactcell.discrepancy.machine.remainder import remainder_of
 from impactcell.discrepancy.machine.selection import SelectionStep, select_terms
+from impactcell.discrepancy.machine.sensor_faults import (
+    blamed_on_sensor,
+    explained_by,
+    sensor_faults,
+    sensor_notes,
+    told_from_sensor,
+)
 from impactcell.discrepancy.machine.shape_intervals import with_shape_intervals
 from impactcell.discrepancy.machine.ties import still_tied
 from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch
@@ -41,6 +42,7 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
     steps: list[SelectionStep] = []
     candidates: list[TermChoice] = []
     enough = MachineFinding.enough(training, held_out)
+    faults = sensor_faults(fits.base, max(record.finer * record.step_s for record in fits.records))
     if enough:
         candidates = [
             choice for choice in fits.candidates if not _is_like_the_machine(fits, training, choice)
@@ -48,9 +50,8 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
         notes = [*notes, *alike_note(fits.candidates, candidates)]
         search = _search(fits, training, candidates)
         steps = select_terms(search, fits.columns(base_terms))
-        if fits.base.delay_s.is_held:
-            sample_s = max(record.finer * record.step_s for record in fits.records)
-            steps = told_from_delay(search, fits.columns(base_terms), steps, sample_s)
+        for fault in faults:
+            steps = told_from_sensor(search, fits.columns(base_terms), steps, fault)
         notes += [step.note for step in steps if step.note]
     proposed = [step.accepted.term for step in steps if step.accepted is not None]
     models, falls = _prove(fits, base_terms, proposed, seed)
@@ -68,11 +69,12 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
         # Blocks are linear in the delay about that of the base model, which took over what the terms explain.
         final = fits.fit(final.terms, settle=True)
         settled = fits.blocks()
-    if enough and fits.base.delay_s.is_held:
+    if enough:
         search = _search(fits, training, ())
-        explained = explained_by_delay(search, fits.columns(final.terms))
-        notes = [*notes, *delay_note(explained)]
-        steps = blamed_on_delay(steps, explained)
+        tried = [explained_by(search, fits.columns(final.terms), fault) for fault in faults]
+        explained = [one for one in tried if one is not None]
+        notes = [*notes, *sensor_notes(explained)]
+        steps = blamed_on_sensor(steps, explained)
     remainder = remainder_of(fits.rows(), final, fits.records)
     notes = [
         *notes,

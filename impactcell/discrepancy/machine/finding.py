@@ -42,7 +42,11 @@ class FallOfGap:
     @property
     def is_real(self) -> bool:
         """Whether held-out blocks confirm it."""
-        return self.low > 0.0 and self.closed >= MIN_CLOSED_SHARE and self.p_value <= MAX_P_VALUE
+        return self.is_real_among(1)
+
+    def is_real_among(self, tests: int) -> bool:
+        """Whether held-out blocks confirm it where so many tests share the error of one (Bonferroni)."""
+        return self.low > 0.0 and self.closed >= MIN_CLOSED_SHARE and self.p_value <= MAX_P_VALUE / tests
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,17 +3,24 @@
 A smooth spline is fitted in each place, as smooth as blocks that it was not fitted to want it. Of the places
 where that helps block after block the one that helps most is condensed: near the spline the squared residuals
 are a quadratic function of its coefficients, functional forms are projected on it, and the best are fitted by
-themselves. Held-out blocks and the held-out simulation decide.
+themselves. Held-out blocks and the held-out simulation decide; where they do not confirm a place the next is
+tried, and the error of the test is shared among all that may be.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.laws import RankedForm, rank_forms
 from impactcell.discrepancy.machine.base_model import LawForm, TermChoice
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, MachineLaw
-from impactcell.discrepancy.machine.free_splines import best_spline, spline_function, tangent_of, with_spline
+from impactcell.discrepancy.machine.free_splines import (
+    FreeSpline,
+    best_spline,
+    spline_function,
+    tangent_of,
+    with_spline,
+)
 from impactcell.discrepancy.machine.law_terms import LAW_PREFIX, term_of
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.model_forces import resistance
@@ -25,10 +32,11 @@ from impactcell.discrepancy.machine.regression import (
 )
 from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, SPLINE_PIECES, splines
 from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, MIN_SHARE_OF_FREE
+from impactcell.discrepancy.machine.sensor_faults import OFF_CENTRE
 from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.ties import TIE_Z
 from impactcell.discrepancy.machine.trials import ChosenTerm, mean_over_error
-from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, Column
+from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.discrepancy.search import MAX_EXPECTED_GAP
 from impactcell.records import Samples
 
@@ -50,6 +58,8 @@ BESIDE_ENCODER = (
 """What is told of a law that was found with the sensor's share taken out."""
 NOTHING_HELPS = "no function of speed, load or position helps block after block that it was not fitted to"
 """Why no law is proposed where no spline holds."""
+GIVES_ENERGY = "with the law that fits best friction would give energy in the range that was gone through"
+"""Why no law is proposed where held-out blocks confirm one that cannot be."""
 NEGATIVE_SHARE = 0.02
 """Share of the largest friction by which it may be below zero before it gives energy [1]."""
 
@@ -91,36 +101,78 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | str:
     ]
     if not holding:
         return NOTHING_HELPS
-    best = holding[0]
-    if _is_of_the_encoder(fits, training, model, best.gains, before):
+    if _is_of_the_encoder(fits, training, model, holding[0].gains, before):
         return ENCODER
-    rivals = tuple(
-        LAW_PREFIX + other.form
-        for other in tried
-        if other is not best and mean_over_error(best.gains - other.gains) < TIE_Z
-    )
-    tested = finding.scale.ranges[COVARIATES[best.form]]
-    smooth = with_spline(fits, training, model, best)
-    tangent, variance = tangent_of(training, fits, smooth, best, tested)
-    ranked = [item for item in rank_forms(tangent) if _is_resolved(item, tested)]
-    choices = _choices(best.form, ranked[:REFITTED], max(map(abs, tested)))
-    laws = _Forms(fits, (*own, *choices), model, choices)
-    chosen, equivalents = laws.condensed(best.gains, before)
-    law_model, blocks = (smooth, held_out) if chosen is None else laws.fitted(chosen)
-    fall = fall_of_gap(blocks, model, law_model, finding.seed)
-    curve = spline_function(tangent, best.penalty / variance, tested)
-    simulated = None
-    if chosen is not None and fall.is_real:
-        # What else is fitted beside the law may not make its simulation look near.
-        without = [simulate_held_out(finding, model)]
-        if model.base is not finding.base:
-            without.append(finding.simulated[-1])
-        nearest = min(without, key=lambda error: error.rmse)
-        simulated = nearest, simulate_held_out(finding, law_model)
-    law = MachineLaw(
-        LAW_PREFIX + best.form, tested, curve, chosen, equivalents, rivals, model, law_model, fall, simulated
-    )
-    return _refusal(finding, law) or law
+    looked_at = _LookedAt(fits, finding, own, training, held_out, model, before, tuple(tried))
+    refused = ""
+    for spline in holding:
+        if refused and _is_of_the_encoder(fits, training, model, spline.gains, before):
+            continue
+        law = looked_at.law_in(spline, len(holding))
+        fault = _refusal(finding, law, len(holding))
+        if not fault:
+            return law
+        refused = refused or fault
+        if fault == GIVES_ENERGY:  # held-out blocks want it all the same: it stands for something else
+            break
+    return refused
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _LookedAt:
+    """What a law is looked for in.
+
+    Attributes
+    ----------
+    own : tuple of TermChoice
+        Terms of the model beyond those of the base model.
+    training, held_out : Blocks
+    model : FittedModel
+    before : ndarray, shape (b,)
+        Squared residual of each training block out of fold, without any law.
+    splines : tuple of FreeSpline
+        In all places.
+    """
+
+    fits: MachineFits
+    finding: MachineFinding
+    own: tuple[TermChoice, ...]
+    training: Blocks
+    held_out: Blocks
+    model: FittedModel
+    before: Samples
+    splines: tuple[FreeSpline, ...]
+
+    def law_in(self, spline: FreeSpline, tests: int) -> MachineLaw:
+        """Condense a spline to a law, and hold it to what it was not fitted to; one of so many `tests`."""
+        fits, finding, model = self.fits, self.finding, self.model
+        rivals = tuple(
+            LAW_PREFIX + other.form
+            for other in self.splines
+            if other is not spline and mean_over_error(spline.gains - other.gains) < TIE_Z
+        )
+        tested = finding.scale.ranges[COVARIATES[spline.form]]
+        smooth = with_spline(fits, self.training, model, spline)
+        tangent, variance = tangent_of(self.training, fits, smooth, spline, tested)
+        ranked = [item for item in rank_forms(tangent) if _is_resolved(item, tested)]
+        choices = _choices(spline.form, ranked[:REFITTED], max(map(abs, tested)))
+        laws = _Forms(fits, (*self.own, *choices), model, choices)
+        chosen, equivalents = laws.condensed(spline.gains, self.before)
+        law_model, blocks = (smooth, self.held_out) if chosen is None else laws.fitted(chosen)
+        fall = fall_of_gap(blocks, model, law_model, finding.seed)
+        curve = spline_function(tangent, spline.penalty / variance, tested)
+        simulated = None
+        if chosen is not None and fall.is_real_among(tests):
+            # What else is fitted beside the law may not make its simulation look near.
+            without = [simulate_held_out(finding, model)]
+            if model.base is not finding.base:
+                without.append(finding.simulated[-1])
+            nearest = min(without, key=lambda error: error.rmse)
+            simulated = nearest, simulate_held_out(finding, law_model)
+        place = LAW_PREFIX + spline.form
+        return MachineLaw(
+            place, tested, curve, chosen, equivalents, rivals, model, law_model, fall, simulated
+        )
 
 
 def _is_of_the_encoder(
@@ -129,7 +181,7 @@ def _is_of_the_encoder(
     """Whether an encoder off its centre does as well as a spline, where the base model holds it at none."""
     if fits.base.coordinate is not Coordinate.ROTATION or not fits.base.position_eccentricity.is_held:
         return False
-    columns = [*model.fit.columns, *((ECCENTRICITY, 0.0, number) for number in range(2))]
+    columns = [*model.fit.columns, *OFF_CENTRE]
     gains = before - out_of_fold_losses(training, columns, fits.priors, fits.nonnegative)
     is_real = mean_over_error(gains) >= MIN_GAIN_Z
     does_as_well = float(gains.sum()) >= MIN_SHARE_OF_FREE * float(spline.sum())
@@ -142,9 +194,9 @@ def _gone_through(finding: MachineFinding) -> list[str]:
     return [form for form in FREE_FORMS if ranges[COVARIATES[form]][1] > ranges[COVARIATES[form]][0]]
 
 
-def _refusal(finding: MachineFinding, law: MachineLaw) -> str:
-    """Say why a law is not proposed; empty if it is."""
-    if not law.fall.is_real:
+def _refusal(finding: MachineFinding, law: MachineLaw, tests: int) -> str:
+    """Say why a law, one of so many that are tested, is not proposed; empty if it is."""
+    if not law.fall.is_real_among(tests):
         return "on held-out blocks the gap does not fall by more than chance"
     if law.simulated is None:
         return ""
@@ -153,7 +205,7 @@ def _refusal(finding: MachineFinding, law: MachineLaw) -> str:
         return "simulated open loop, the law that fits best errs no less on held-out records than no law"
     least, largest = resistance(finding, law.model)
     if least < -NEGATIVE_SHARE * largest:
-        return "with the law that fits best friction would give energy in the range that was gone through"
+        return GIVES_ENERGY
     return ""
 
 

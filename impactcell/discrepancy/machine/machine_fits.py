@@ -9,7 +9,6 @@ from typing import Self
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, TermChoice
-from impactcell.discrepancy.machine.delay import DELAY
 from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, row_weights, weighed
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.law_terms import term_of
@@ -25,6 +24,7 @@ from impactcell.discrepancy.machine.regression import (
     fit_blocks,
 )
 from impactcell.discrepancy.machine.rival_forms import Basis
+from impactcell.discrepancy.machine.sensor_faults import DELAY
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, motion_scale
 from impactcell.discrepancy.machine.weak_form import (

@@ -74,6 +74,9 @@ NOTES: Final[Patterns] = (
      lambda m: (f"Eine um {m[1]} ms zu {'spät' if m[2] == 'late' else 'früh'} aufgezeichnete Kraft erklärte "
                 f"{m[3]} % dessen, was bleibt: Mit delay_s unter den nuisances des Grundmodells wird die "
                 "Verzögerung mit allem anderen gefunden.")),
+    (r"An encoder that turns (\S+) mrad off its centre would explain (\d+) % of what remains: .*",
+     (r"Ein Drehgeber, der \1 mrad außermittig sitzt, erklärte \2 % dessen, was bleibt: Mit "
+      "position_eccentricity unter den nuisances des Grundmodells wird das mit allem anderen gefunden.")),
     (r"A constant force of its own in each record would take (\d+) % of what remains: .*",
      (r"Eine eigene konstante Kraft in jeder Messung erklärte \1 % dessen, was bleibt: force_offset: {std: "
       r"free, each: record} unter den nuisances des Grundmodells lässt sie offen.")),
@@ -146,6 +149,10 @@ REASONS: Final[Patterns] = (
     (r"a force recorded late or early by less than a sample would explain as much as the best term",
      ("eine um weniger als einen Abtastschritt zu spät oder zu früh aufgezeichnete Kraft würde ebenso viel "
       "erklären wie der beste Term")),
+    (r"an encoder that turns off its centre would explain as much as the best term",
+     "ein Drehgeber, der außermittig sitzt, würde ebenso viel erklären wie der beste Term"),
+    (r"an encoder that turns (\S+) mrad off its centre would explain (\d+) % of it",
+     r"ein Drehgeber, der \1 mrad außermittig sitzt, erklärte \2 % davon"),
     (r"a force recorded (\S+) ms (late|early) would explain (\d+) % of it",
      lambda m: f"eine um {m[1]} ms zu {'spät' if m[2] == 'late' else 'früh'} aufgezeichnete Kraft erklärte "
      f"{m[3]} % davon"),
