@@ -7,11 +7,8 @@ from types import FunctionType, ModuleType
 
 import pytest
 
-from impactcell.campaign import Coordinate
 from impactcell.discrepancy.laws import finding as shot_laws
 from impactcell.discrepancy.machine import CATALOGUE, FREE_FORMS, investigation, law_search, selection
-from impactcell.discrepancy.machine.base_model import BaseModel
-from impactcell.discrepancy.machine.sensor_faults import Explained, sensor_faults, sensor_notes
 from impactcell.discrepancy.report import (
     german_machine_sentences,
     german_sentences,
@@ -81,7 +78,7 @@ def test_every_kind_of_fault_has_a_german_name() -> None:
 def test_every_reason_for_naming_nothing_is_said_in_german(code: FunctionType, least: int) -> None:
     reasons = [text for text in sentences_of(code, least) if not text[0].isupper()]
     assert reasons
-    for reason in [*reasons, law_search.ENCODER, selection.NOT_IN_EVERY_BLOCK]:
+    for reason in [*reasons, selection.NOT_IN_EVERY_BLOCK]:
         assert german_sentences.reason(reason)[0] == "de", reason
 
 
@@ -110,9 +107,6 @@ def test_notes_on_a_machine_are_said_in_german() -> None:
     beside = "covariate_friction(oil) shows only beside quadratic_drag, which hides it on these records;"
     off = "Simulated open loop, held-out records are 0.2 N m off with it, 0.1 without."
     notes += [f"{alike} not looked for.", f"{beside} quadratic_drag is not named.", off, DRIFTS]
-    late, bent = sensor_faults(BaseModel(coordinate=Coordinate.ROTATION), 1e-3)
-    notes += sensor_notes([Explained(late, (-0.002,), 0.4), Explained(bent, (0.003, 0.004), 0.6)])
-    assert notes[-1].startswith("An encoder that turns 5 mrad off its centre would explain 60 % of what")
     for note in notes:
         assert german_sentences.note(note)[0] == "de", note
 

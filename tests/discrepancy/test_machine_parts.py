@@ -12,7 +12,11 @@ from impactcell.discrepancy.machine import channel_values, proof, simulation
 from impactcell.discrepancy.machine import finding as machine_finding
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
 from impactcell.discrepancy.machine.finding import Remainder
+from impactcell.discrepancy.machine.regression import blocks_of
 from impactcell.discrepancy.machine.remainder import remainder_of
+from impactcell.discrepancy.machine.rival_forms import hats
+from impactcell.discrepancy.machine.trials import TermSearch
+from impactcell.discrepancy.machine.weak_form import Rows
 from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
 
 
@@ -160,3 +164,21 @@ def test_a_simulation_that_errs_more_with_a_named_term_is_told(
     notes = notes_of_simulation(found, errors)
     assert len(notes) == said
     assert all("0.013 m off with it, 0.008 without" in note for note in notes)
+
+
+def test_a_free_form_goes_on_straight_where_one_record_alone_has_been() -> None:
+    """Speeds of the first record are twice those of the others, which its corners hardly see."""
+    rng = np.random.default_rng(5)
+    record = np.arange(1200) // 240
+    speed = rng.uniform(0.0, 1.0, 1200) * np.where(record == 0, 2.0, 1.02)
+    columns = {("friction_over_speed", 0.0, i): row for i, row in enumerate(hats(speed, 0.0, 2.0))}
+    target = 3.0 * speed + 0.5 * speed**2 + rng.normal(size=1200)
+    nothing = np.zeros(1200)
+    rows = Rows(target, columns, record, np.arange(1200.0), np.ones(1200), nothing)
+    number = np.arange(1200) // 40
+    blocks = blocks_of(rows, number, {int(block): int(record[40 * block]) for block in np.unique(number)})
+    search = TermSearch(blocks, (), {}, {}, frozenset())
+    before, noise = search.losses([]), float(blocks.noise.sum())
+    free = search.free_losses([], "friction_over_speed")
+    assert free.sum() < 1.5 * noise < 6.0 * noise < before.sum()
+    assert search.losses([*columns]).sum() > 3.0 * free.sum()  # without a penalty

@@ -16,16 +16,15 @@ from impactcell.discrepancy.machine import (
     TermChoice,
     investigate_machine,
 )
+from impactcell.discrepancy.machine.held_numbers import (
+    DELAY,
+    HeldNumber,
+    held_numbers,
+    told_from_sensor,
+)
 from impactcell.discrepancy.machine.regression import blocks_of
 from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS
 from impactcell.discrepancy.machine.selection import SelectionStep, select_terms
-from impactcell.discrepancy.machine.sensor_faults import (
-    AS_LATE,
-    DELAY,
-    SensorFault,
-    sensor_faults,
-    told_from_sensor,
-)
 from impactcell.discrepancy.machine.trials import TermSearch
 from impactcell.discrepancy.machine.weak_form import Rows
 from impactcell.records import Capture, Channel, Samples
@@ -114,10 +113,11 @@ def search_of(delayed: float, viscous: float) -> tuple[TermSearch, list[Selectio
     return search, select_terms(search, [])
 
 
-def late_by(sample_s: float) -> SensorFault:
+def late_by(sample_s: float) -> HeldNumber:
     """A force that is late or early by up to a sample."""
-    (fault,) = sensor_faults(AXIS, sample_s)
-    return fault
+    late, *_ = held_numbers(AXIS, sample_s)
+    assert late.columns == (DELAY,)
+    return late
 
 
 def test_a_search_of_one_term_and_of_none_ends() -> None:
@@ -127,14 +127,22 @@ def test_a_search_of_one_term_and_of_none_ends() -> None:
 
 
 def test_no_term_is_named_that_a_delay_of_less_than_a_sample_explains_as_well() -> None:
-    search, steps = search_of(delayed=2.0, viscous=0.0)
+    search, steps = search_of(delayed=1.0, viscous=1.0)
     assert steps[0].accepted is not None
     refused = told_from_sensor(search, [], steps, late_by(2.5))
-    assert [(step.accepted, step.reason) for step in refused] == [(None, AS_LATE)]
+    assert [(step.accepted, step.reason) for step in refused] == [(None, late_by(2.5).as_well)]
+
+
+def test_no_term_is_named_that_any_delay_explains_better() -> None:
+    search, steps = search_of(delayed=2.0, viscous=0.0)
+    assert steps[0].accepted is not None
+    for sample_s in (1.5, 2.5):
+        refused = told_from_sensor(search, [], steps, late_by(sample_s))
+        assert [(step.accepted, step.reason) for step in refused] == [(None, late_by(sample_s).better)]
 
 
 def test_a_delay_of_more_than_a_sample_or_that_explains_less_is_no_rival() -> None:
-    for (delayed, viscous), sample_s in (((2.0, 0.0), 1.5), ((0.0, 2.0), 2.5)):
+    for (delayed, viscous), sample_s in (((1.0, 1.0), 1.5), ((0.0, 2.0), 2.5)):
         search, steps = search_of(delayed, viscous)
         assert told_from_sensor(search, [], steps, late_by(sample_s)) is steps
 

@@ -5,6 +5,14 @@ from dataclasses import replace
 
 from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
+from impactcell.discrepancy.machine.held_numbers import (
+    blamed_on_number,
+    explained_by,
+    held_number_notes,
+    held_numbers,
+    sampling_step_s,
+    told_from_sensor,
+)
 from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
@@ -12,13 +20,6 @@ from impactcell.discrepancy.machine.record_constants import constants_note
 from impactcell.discrepancy.machine.regression import Blocks
 from impactcell.discrepancy.machine.remainder import remainder_of
 from impactcell.discrepancy.machine.selection import SelectionStep, select_terms
-from impactcell.discrepancy.machine.sensor_faults import (
-    blamed_on_sensor,
-    explained_by,
-    sensor_faults,
-    sensor_notes,
-    told_from_sensor,
-)
 from impactcell.discrepancy.machine.shape_intervals import with_shape_intervals
 from impactcell.discrepancy.machine.ties import still_tied
 from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch
@@ -42,7 +43,7 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
     steps: list[SelectionStep] = []
     candidates: list[TermChoice] = []
     enough = MachineFinding.enough(training, held_out)
-    faults = sensor_faults(fits.base, max(record.finer * record.step_s for record in fits.records))
+    numbers = held_numbers(fits.base, sampling_step_s(fits.records))
     if enough:
         candidates = [
             choice for choice in fits.candidates if not _is_like_the_machine(fits, training, choice)
@@ -50,8 +51,8 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
         notes = [*notes, *alike_note(fits.candidates, candidates)]
         search = _search(fits, training, candidates)
         steps = select_terms(search, fits.columns(base_terms))
-        for fault in faults:
-            steps = told_from_sensor(search, fits.columns(base_terms), steps, fault)
+        for number in numbers:
+            steps = told_from_sensor(search, fits.columns(base_terms), steps, number)
         notes += [step.note for step in steps if step.note]
     proposed = [step.accepted.term for step in steps if step.accepted is not None]
     models, falls = _prove(fits, base_terms, proposed, seed)
@@ -71,10 +72,10 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
         settled = fits.blocks()
     if enough:
         search = _search(fits, training, ())
-        tried = [explained_by(search, fits.columns(final.terms), fault) for fault in faults]
+        tried = [explained_by(search, fits.columns(final.terms), number) for number in numbers]
         explained = [one for one in tried if one is not None]
-        notes = [*notes, *sensor_notes(explained)]
-        steps = blamed_on_sensor(steps, explained)
+        notes = [*notes, *held_number_notes(explained)]
+        steps = blamed_on_number(steps, explained)
     remainder = remainder_of(fits.rows(), final, fits.records)
     notes = [
         *notes,

@@ -151,6 +151,8 @@ class MachineLaw:
         Of the held-out gap, from the one to the other.
     simulated : (OpenLoopError, OpenLoopError) or None
         Of the held-out simulation, without and with it; None without a functional form.
+    beside : tuple of str
+        What the base model holds and is left free without and with it.
     """
 
     place: str
@@ -163,6 +165,7 @@ class MachineLaw:
     model: FittedModel
     fall: FallOfGap
     simulated: tuple[OpenLoopError, OpenLoopError] | None
+    beside: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,10 +7,10 @@ themselves. Held-out blocks and the held-out simulation decide; where they do no
 tried, and the error of the test is shared among all that may be.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from impactcell.campaign import Coordinate
 from impactcell.discrepancy.laws import RankedForm, rank_forms
 from impactcell.discrepancy.machine.base_model import LawForm, TermChoice
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, MachineLaw
@@ -20,6 +20,15 @@ from impactcell.discrepancy.machine.free_splines import (
     spline_function,
     tangent_of,
     with_spline,
+)
+from impactcell.discrepancy.machine.held_numbers import (
+    DELAY,
+    NEARLY_ALL,
+    HeldNumber,
+    does_as_well,
+    fitted,
+    held_numbers,
+    sampling_step_s,
 )
 from impactcell.discrepancy.machine.law_terms import LAW_PREFIX, term_of
 from impactcell.discrepancy.machine.machine_fits import MachineFits
@@ -32,7 +41,6 @@ from impactcell.discrepancy.machine.regression import (
 )
 from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, SPLINE_PIECES, splines
 from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, MIN_SHARE_OF_FREE
-from impactcell.discrepancy.machine.sensor_faults import OFF_CENTRE
 from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.ties import TIE_Z
 from impactcell.discrepancy.machine.trials import ChosenTerm, mean_over_error
@@ -46,16 +54,8 @@ REFITTED = 20
 """Functional forms that are fitted by themselves, of those that come nearest to the spline."""
 PIECES_PER_WAVE = 3.0
 """Pieces of a spline that a wave takes to be seen in it."""
-ENCODER = (
-    "an encoder that turns off its centre does as well as any function of speed, load or position; "
-    "position_eccentricity among the nuisances of the base model would tell"
-)
-"""Why no law is proposed where the sensor may be to blame, and nothing helps beside it."""
-BESIDE_ENCODER = (
-    "An encoder that turns off its centre explains as much of what remains as any function of speed, load or "
-    "position; the law is of what is left beside it, and has position_eccentricity among its nuisances."
-)
-"""What is told of a law that was found with the sensor's share taken out."""
+MOST_FREED = 3
+"""Numbers that the base model holds, and beside which a law is looked for."""
 NOTHING_HELPS = "no function of speed, load or position helps block after block that it was not fitted to"
 """Why no law is proposed where no spline holds."""
 GIVES_ENERGY = "with the law that fits best friction would give energy in the range that was gone through"
@@ -65,21 +65,29 @@ NEGATIVE_SHARE = 0.02
 
 
 def with_law(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
-    """Look for a law where a finding leaves something; the finding with it, or with the reason for none."""
+    """Look for a law where a finding leaves something; the finding with it, or with the reason for none.
+
+    Where a number that the base model holds does as well as any function, a law is looked for beside it.
+    """
     if finding.missing_blocks or finding.is_at_floor:
         return finding
+    freed: list[HeldNumber] = []
     outcome = _find_law(fits, finding)
-    if outcome == ENCODER:
-        beside = _find_law(fits.with_encoder_off_its_centre(), finding)
-        if isinstance(beside, MachineLaw):
-            return replace(finding, law=beside, notes=(*finding.notes, BESIDE_ENCODER))
-    if isinstance(outcome, str):
-        return replace(finding, law_refused=outcome)
-    return replace(finding, law=outcome)
+    while isinstance(outcome, HeldNumber) and outcome.columns != (DELAY,) and len(freed) < MOST_FREED:
+        freed.append(outcome)
+        fits = fits.with_freed(outcome)
+        outcome = _find_law(fits, finding)
+    if isinstance(outcome, MachineLaw):
+        notes = (*finding.notes, *(number.beside_a_law for number in freed))
+        law = replace(outcome, beside=tuple(number.phrase for number in freed))
+        return replace(finding, law=law, notes=notes)
+    if isinstance(outcome, HeldNumber):
+        outcome = outcome.as_a_law
+    return replace(finding, law_refused=freed[0].as_a_law if freed else outcome)
 
 
-def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | str:
-    """Find a law beside the final model, whose nuisances are those of `fits`."""
+def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNumber | str:
+    """Find a law beside the final model, whose nuisances are those of `fits`; else what is in its place."""
     own = tuple(term.choice for term in finding.final.terms[len(finding.nominal.terms) :])
     training, held_out = fits.blocks(fits.rows_with(own, splines))
     columns = fits.columns(finding.final.terms)
@@ -93,7 +101,8 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | str:
         (best_spline(fits, training, model, before, form) for form in _gone_through(finding)),
         key=lambda spline: -float(spline.gains.sum()),
     )
-    least = MIN_SHARE * float(before.sum() - training.noise.sum())
+    looked_at = _LookedAt(fits, finding, own, training, held_out, model, before, tuple(tried))
+    least = MIN_SHARE * looked_at.excess
     holding = [
         spline
         for spline in tried
@@ -101,12 +110,11 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | str:
     ]
     if not holding:
         return NOTHING_HELPS
-    if _is_of_the_encoder(fits, training, model, holding[0].gains, before):
-        return ENCODER
-    looked_at = _LookedAt(fits, finding, own, training, held_out, model, before, tuple(tried))
+    if (number := looked_at.number_in_place_of(holding[0])) is not None:
+        return number
     refused = ""
     for spline in holding:
-        if refused and _is_of_the_encoder(fits, training, model, spline.gains, before):
+        if refused and looked_at.number_in_place_of(spline) is not None:
             continue
         law = looked_at.law_in(spline, len(holding))
         fault = _refusal(finding, law, len(holding))
@@ -143,6 +151,30 @@ class _LookedAt:
     before: Samples
     splines: tuple[FreeSpline, ...]
 
+    @property
+    def excess(self) -> float:
+        """Squared residual of the training blocks above the noise."""
+        return float(self.before.sum() - self.training.noise.sum())
+
+    def number_in_place_of(self, spline: FreeSpline) -> HeldNumber | None:
+        """Of the numbers that the base model holds and that do as well as a spline the best."""
+        best, most = None, 0.0
+        for number in held_numbers(self.fits.base, sampling_step_s(self.fits.records)):
+            gains = self.before - out_of_fold_losses(
+                self.training,
+                [*self.model.fit.columns, *number.columns],
+                self.fits.priors,
+                self.fits.nonnegative,
+            )
+            gain = float(gains.sum())
+            if number.columns == (DELAY,) and gain < NEARLY_ALL * self.excess:
+                continue
+            if gain > most and does_as_well(gains, spline.gains, MIN_SHARE_OF_FREE):
+                held = self.training, self.model.fit.columns, number, self.fits.priors, self.fits.nonnegative
+                if math.hypot(*fitted(*held)) <= number.farthest:
+                    best, most = number, gain
+        return best
+
     def law_in(self, spline: FreeSpline, tests: int) -> MachineLaw:
         """Condense a spline to a law, and hold it to what it was not fitted to; one of so many `tests`."""
         fits, finding, model = self.fits, self.finding, self.model
@@ -173,19 +205,6 @@ class _LookedAt:
         return MachineLaw(
             place, tested, curve, chosen, equivalents, rivals, model, law_model, fall, simulated
         )
-
-
-def _is_of_the_encoder(
-    fits: MachineFits, training: Blocks, model: FittedModel, spline: Samples, before: Samples
-) -> bool:
-    """Whether an encoder off its centre does as well as a spline, where the base model holds it at none."""
-    if fits.base.coordinate is not Coordinate.ROTATION or not fits.base.position_eccentricity.is_held:
-        return False
-    columns = [*model.fit.columns, *OFF_CENTRE]
-    gains = before - out_of_fold_losses(training, columns, fits.priors, fits.nonnegative)
-    is_real = mean_over_error(gains) >= MIN_GAIN_Z
-    does_as_well = float(gains.sum()) >= MIN_SHARE_OF_FREE * float(spline.sum())
-    return is_real and does_as_well and mean_over_error(spline - gains) < TIE_Z
 
 
 def _gone_through(finding: MachineFinding) -> list[str]:

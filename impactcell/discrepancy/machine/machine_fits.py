@@ -11,6 +11,7 @@ import numpy as np
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, TermChoice
 from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, row_weights, weighed
 from impactcell.discrepancy.machine.finding import FittedModel
+from impactcell.discrepancy.machine.held_numbers import DELAY, HeldNumber
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.model_forces import friction_at_rest
 from impactcell.discrepancy.machine.nuisance_priors import nuisance_priors
@@ -24,7 +25,6 @@ from impactcell.discrepancy.machine.regression import (
     fit_blocks,
 )
 from impactcell.discrepancy.machine.rival_forms import Basis
-from impactcell.discrepancy.machine.sensor_faults import DELAY
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, motion_scale
 from impactcell.discrepancy.machine.weak_form import (
@@ -89,10 +89,9 @@ class MachineFits:
             choice.name: shape_grid(term_of(choice), self.scale) for choice in (*base.terms, *self.candidates)
         }
 
-    def with_encoder_off_its_centre(self) -> Self:
-        """Leave free how far off its centre the encoder turns."""
-        base = replace(self.base, position_eccentricity=NumberPrior(0.0, math.inf))
-        fits = type(self)(self.records, base, self.candidates, self.held)
+    def with_freed(self, number: HeldNumber) -> Self:
+        """Leave free a number that the base model holds."""
+        fits = type(self)(self.records, number.freed(self.base), self.candidates, self.held)
         fits.gravity, fits.delay_s, fits.doubt = self.gravity, self.delay_s, self.doubt
         fits.shapes = dict(self.shapes)
         return fits

@@ -154,13 +154,18 @@ def out_of_fold_losses(
     columns: Sequence[Column],
     priors: Mapping[Column, NumberPrior],
     nonnegative: frozenset[Column],
+    penalty: Samples | None = None,
 ) -> Samples:
-    """Squared residual of each block under coefficients fitted without its fold, shape (b,)."""
+    """Squared residual of each block under coefficients fitted without its fold, shape (b,).
+
+    `penalty`, shape (p, p): a quadratic form of the coefficients that is added to the squared residuals of
+    all blocks.
+    """
     losses = np.empty(len(blocks))
     for fold, outside in zip(np.unique(blocks.fold), blocks.without_folds, strict=True):
         inside = np.flatnonzero(blocks.fold == fold)
         sums = outside, len(blocks) - len(inside)
-        coefficients, _ = _solve(blocks, sums, columns, priors, nonnegative)
+        coefficients, _ = _solve(blocks, sums, columns, priors, nonnegative, penalty)
         losses[inside] = blocks.losses(columns, coefficients, inside)
     return losses
 
@@ -171,6 +176,7 @@ def _solve(
     columns: Sequence[Column],
     priors: Mapping[Column, NumberPrior],
     nonnegative: frozenset[Column],
+    penalty: Samples | None = None,
 ) -> tuple[Samples, Samples]:
     """Coefficients on some blocks, and which of them stand at the end of what they may be.
 
@@ -179,6 +185,7 @@ def _solve(
     places = blocks.places(columns)
     total, count = sums
     gram, right = total[np.ix_(places, places)], total[places, -1]
+    smooth = np.zeros_like(gram) if penalty is None else penalty * (count / len(blocks))
     lower = np.array([0.0 if column in nonnegative else -_reach(column, priors) for column in columns])
     upper = np.array([_reach(column, priors) for column in columns])
     held = np.zeros(len(columns), dtype=bool)
@@ -188,7 +195,7 @@ def _solve(
         free = np.flatnonzero(~held)
         for _ in range(2):
             # The prior's weight goes by the scatter of what is left, known after a first fit.
-            matrix = gram + np.diag(weight)
+            matrix = gram + smooth + np.diag(weight)
             matrix = matrix + RIDGE * np.diag(np.diag(matrix))
             beside = right[free] - matrix[np.ix_(free, np.flatnonzero(held))] @ coefficients[held]
             coefficients[free] = _solved(matrix[np.ix_(free, free)], beside)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 from impactcell.discrepancy.machine.base_model import TermChoice
-from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS, PLACES
+from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, PLACES
 from impactcell.discrepancy.machine.ties import is_tied, tied_terms
 from impactcell.discrepancy.machine.trials import TermSearch, Trial, mean_over_error
 from impactcell.discrepancy.machine.weak_form import Column
@@ -105,12 +105,7 @@ def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermCh
     trials = sorted(
         (search.best_shape(choice, columns, before) for choice in candidates), key=lambda one: -one.gain
     )
-    free_gains = {
-        form: float(
-            (before - search.losses([*columns, *((form, 0.0, number) for number in range(KNOTS))])).sum()
-        )
-        for form in FREE_FORMS
-    }
+    free_gains = {form: float((before - search.free_losses(columns, form)).sum()) for form in FREE_FORMS}
     every = [column for trial in trials if trial.gain > 0.0 for column in trial.term.columns]
     gain_of_all = float((before - search.losses([*columns, *every])).sum())
     best = trials[0]

@@ -3,6 +3,7 @@
 from typing import Final
 
 from impactcell.discrepancy.machine import MachineFinding
+from impactcell.discrepancy.report.german_held_numbers import held_number
 from impactcell.discrepancy.report.german_notes import Patterns, note, reason
 from impactcell.discrepancy.report.german_sentences import equation, in_german, label, written
 from impactcell.discrepancy.report.german_words import phrase as channel_name
@@ -10,6 +11,7 @@ from impactcell.discrepancy.report.german_words import term_name as phrase
 from impactcell.discrepancy.report.machine_sentences import law_equation, noise_keys
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import german_open_loop_sentence
+from impactcell.physics.effect_names import as_title
 
 __all__ = ["equation", "headline", "label", "note", "phrase", "reason", "reference", "setting", "written"]
 _SETTINGS: Final[Patterns] = (
@@ -86,8 +88,10 @@ def headline(finding: MachineFinding) -> str:
             said += " Etwas bleibt, das es nicht erklärt."
     law = finding.law
     if law is not None:
-        if law.model.base != finding.base:
-            said += f" Ein Drehgeber, der außermittig sitzt, bringt sie auf {law.fall.before:.2f}; neben ihm:"
+        if law.beside:
+            beside = as_title(enumerated([held_number(phrase) for phrase in law.beside], "und"))
+            bring = "bringt" if len(law.beside) == 1 else "bringen"
+            said += f" {beside} {bring} sie auf {law.fall.before:.2f}; daneben:"
         said += (
             f" {equation(law_equation(law))}, bringt die Abweichung auf {law.fall.after:.2f}: "
             "ein Gesetz, das keine Liste hatte."

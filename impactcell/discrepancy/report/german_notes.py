@@ -8,10 +8,11 @@ import re
 from collections.abc import Callable, Sequence
 from typing import Final
 
+from impactcell.discrepancy.report.german_held_numbers import held_number, key_of
 from impactcell.discrepancy.report.german_words import phrase, term_name
 from impactcell.german.data_faults import german_data_fault
 from impactcell.german.findings import with_decimal_commas
-from impactcell.physics.effect_names import identifier_of
+from impactcell.physics.effect_names import as_title, identifier_of
 
 Patterns = Sequence[tuple[str, str | Callable[[re.Match[str]], str]]]
 """English as a pattern, and German as that is expanded; a function gives nothing where it knows no part."""
@@ -70,13 +71,10 @@ NOTES: Final[Patterns] = (
     (r"The force is held from one update to the next in (\d+) of (\d+) records: .*",
      (r"Die Kraft wird in \1 von \2 Messungen von einem Wert zum nächsten gehalten: Sie gilt als Vorgabe "
       r"ohne Rauschen, die von ihrem Messwert bis zum nächsten wirkt.")),
-    (r"A force recorded (\S+) ms (late|early) would explain (\d+) % of what remains: .*",
-     lambda m: (f"Eine um {m[1]} ms zu {'spät' if m[2] == 'late' else 'früh'} aufgezeichnete Kraft erklärte "
-                f"{m[3]} % dessen, was bleibt: Mit delay_s unter den nuisances des Grundmodells wird die "
-                "Verzögerung mit allem anderen gefunden.")),
-    (r"An encoder that turns (\S+) mrad off its centre would explain (\d+) % of what remains: .*",
-     (r"Ein Drehgeber, der \1 mrad außermittig sitzt, erklärte \2 % dessen, was bleibt: Mit "
-      "position_eccentricity unter den nuisances des Grundmodells wird das mit allem anderen gefunden.")),
+    (r"(An?\w* .+) would explain (\d+) % of what remains: (.+) finds it with everything else\.",
+     lambda m: f"{said} erklärte {m[2]} % dessen, was bleibt: {key_of(m[3])} zeigt es mit allem "
+     "anderen."
+     if (said := as_title(held_number(m[1]))) else ""),
     (r"A constant force of its own in each record would take (\d+) % of what remains: .*",
      (r"Eine eigene konstante Kraft in jeder Messung erklärte \1 % dessen, was bleibt: force_offset: {std: "
       r"free, each: record} unter den nuisances des Grundmodells lässt sie offen.")),
@@ -103,10 +101,10 @@ NOTES: Final[Patterns] = (
     (r"Nothing pulls back here, and the smallest constant force adds up: .*",
      ("Hier zieht nichts zurück, und die kleinste konstante Kraft summiert sich auf: In der Simulation hat "
       "jede zurückgehaltene Messung eine eigene, mit dem Genannten und ohne es.")),
-    (r"An encoder that turns off its centre explains as much of what remains .*",
-     ("Ein Drehgeber, der außermittig sitzt, erklärt von dem, was bleibt, so viel wie jede Funktion von "
-      "Geschwindigkeit, Last oder Ort; das Gesetz gilt dem, was neben ihm bleibt, und hat "
-      "position_eccentricity unter seinen nuisances.")),
+    (r"(An?\w* .+) explains as much of what remains as any function .* left beside it, and has (.+)\.",
+     lambda m: f"{said} erklärt von dem, was bleibt, so viel wie jede Funktion von Geschwindigkeit, Last "
+     f"oder Ort; das Gesetz gilt dem, was daneben bleibt, und hat {key_of(m[2])}."
+     if (said := as_title(held_number(m[1]))) else ""),
     (r"Simulated open loop, held-out records are (\S+ .+?) off with it, (\S+) without\.",
      r"Ohne Rückführung simuliert liegen zurückgehaltene Messungen mit ihm um \1 daneben, ohne um \2."),
 )  # fmt: skip
@@ -134,11 +132,11 @@ REASONS: Final[Patterns] = (
     (r"no function of speed, load or position helps block after block that it was not fitted to",
      ("keine Funktion von Geschwindigkeit, Last oder Ort hilft in einem Block um den anderen, der nicht "
       "angepasst wurde")),
-    (r"an encoder that turns off its centre does as well as any function of speed, load or position",
-     ("ein Drehgeber, der außermittig sitzt, erklärt es so gut wie jede Funktion von Geschwindigkeit, Last "
-      "oder Ort")),
-    (r"position_eccentricity among the nuisances of the base model would tell",
-     "position_eccentricity unter den nuisances des Grundmodells zeigte es"),
+    (r"(an?\w* .+) does as well as any function of speed, load or position",
+     lambda m: f"{said} erklärt es so gut wie jede Funktion von Geschwindigkeit, Last oder Ort"
+     if (said := held_number(m[1])) else ""),
+    (r"(\w+ among the nuisances of the base model|a free \w+ in the base model) would tell",
+     lambda m: f"{key_of(m[1])} zeigte es"),
     (r"simulated open loop, the law that fits best errs no less on held-out records than no law",
      "ohne Rückführung simuliert irrt das beste Gesetz an Zurückgehaltenem nicht weniger als keines"),
     (r"with the law that fits best friction would give energy in the range that was gone through",
@@ -146,16 +144,13 @@ REASONS: Final[Patterns] = (
     (r"no term does better in block after block that it was not fitted to",
      "kein Term ist in einem Block um den anderen besser, der nicht angepasst wurde"),
     (r"no term closes a fifth of the gap", "kein Term schließt ein Fünftel der Abweichung"),
-    (r"a force recorded late or early by less than a sample would explain as much as the best term",
-     ("eine um weniger als einen Abtastschritt zu spät oder zu früh aufgezeichnete Kraft würde ebenso viel "
-      "erklären wie der beste Term")),
-    (r"an encoder that turns off its centre would explain as much as the best term",
-     "ein Drehgeber, der außermittig sitzt, würde ebenso viel erklären wie der beste Term"),
-    (r"an encoder that turns (\S+) mrad off its centre would explain (\d+) % of it",
-     r"ein Drehgeber, der \1 mrad außermittig sitzt, erklärte \2 % davon"),
-    (r"a force recorded (\S+) ms (late|early) would explain (\d+) % of it",
-     lambda m: f"eine um {m[1]} ms zu {'spät' if m[2] == 'late' else 'früh'} aufgezeichnete Kraft erklärte "
-     f"{m[3]} % davon"),
+    (r"(an?\w* .+) would explain as much as the best term",
+     lambda m: f"{said} würde ebenso viel erklären wie der beste Term"
+     if (said := held_number(m[1])) else ""),
+    (r"(an?\w* .+) would explain more than the best term",
+     lambda m: f"{said} würde mehr erklären als der beste Term" if (said := held_number(m[1])) else ""),
+    (r"(an?\w* .+) would explain (\d+) % of it",
+     lambda m: f"{said} erklärte {m[2]} % davon" if (said := held_number(m[1])) else ""),
     (r"no term stands out from what all of them close together",
      "kein Term hebt sich von dem ab, was alle zusammen schließen"),
     (r"the shape of the best term came to the end of its range",

@@ -40,12 +40,13 @@ def write_machine_reports(
 
 
 def format_share(part: float, whole: float) -> str:
-    """Write a share in per cent, without a sign where it is none.
+    """Write a share in per cent, without a sign where it is none; what does more harm than good is all alike.
 
-    >>> format_share(0.123, 1.0), format_share(-1e-5, 1.0), format_share(1.0, 0.0)
-    ('12.3 %', '0.0 %', '0.0 %')
+    >>> format_share(0.123, 1.0), format_share(-1e-5, 1.0), format_share(1.0, 0.0), format_share(-7e9, 1.0)
+    ('12.3 %', '0.0 %', '0.0 %', '< -100 %')
     """
-    return f"{round(100.0 * part / whole if whole else 0.0, 1) + 0.0:.1f} %"
+    share = 100.0 * part / whole if whole else 0.0
+    return "< -100 %" if share < -100.0 else f"{round(share, 1) + 0.0:.1f} %"
 
 
 def with_prefix(simulation: Mapping[str, Any]) -> dict[str, Any]:

@@ -122,6 +122,7 @@ def _law(finding: MachineFinding) -> dict[str, Any]:
         "parameters": {} if chosen is None else _law_parameters(finding, chosen),
         "equivalents": list(law.equivalents),
         "rival_places": [FREE_FORMS[LAW_PLACES[place]] for place in law.rival_places],
+        "beside": list(law.beside),
         "tested_range": {
             covariate: {
                 "low": round_digits(law.tested[0]), "high": round_digits(law.tested[1]), "unit": unit

@@ -25,8 +25,9 @@ def headline(finding: MachineFinding) -> str:
     """Say what is established, what remains, and which law would explain it, if one was found."""
     law, said = finding.law, _conclusion(finding)
     if law is not None:
-        if law.model.base != finding.base:
-            said += f" Beside an encoder that turns off its centre, which takes it to {law.fall.before:.2f},"
+        if law.beside:
+            take = "takes" if len(law.beside) == 1 else "take"
+            said += f" Beside {enumerated(law.beside, 'and')}, which {take} it to {law.fall.before:.2f},"
         said += (
             f" {law_equation(law)}, takes the held-out gap to {law.fall.after:.2f}: "
             "a law that nobody had listed."

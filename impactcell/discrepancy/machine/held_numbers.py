@@ -1,0 +1,281 @@
+"""What a number that a base model holds would explain if it were off: a late force, a zero, an inertia.
+
+A force that was recorded late looks like its own derivative, an encoder off its centre like a wave of the
+angle, a wrong zero like a constant. Each is a column of the regression, and is held against what would be
+named, and against a law that nobody had listed.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from impactcell.campaign import Coordinate
+from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response
+from impactcell.discrepancy.machine.regression import Blocks, fit_blocks
+from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, MIN_SHARE, SelectionStep
+from impactcell.discrepancy.machine.ties import MIN_TIED_SHARE, TIE_Z
+from impactcell.discrepancy.machine.trials import TermSearch, mean_over_error
+from impactcell.discrepancy.machine.uniform_records import UniformRecord
+from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, Column
+from impactcell.records import Samples
+
+DELAY: Column = ("delay_s", 0.0, 0)
+"""Column of how late the force was recorded: the force's derivative."""
+MOST = 0.5
+"""Share of what remains from which on a number that is off is what the headline tells [1]."""
+NEARLY_ALL = 0.9
+"""The same from which on a force recorded late or early, by however much, takes the place of a law [1]."""
+FARTHEST_OFF_RAD = 0.05
+"""Error of an angle, three degrees, beyond which no encoder that anybody uses turns off its centre."""
+FARTHEST_ANGLE_RAD = 0.5
+"""Error of an angle beyond which a wave of it is not small."""
+FARTHEST_SHARE = 0.5
+"""Share of a mass, a gain or a torque of gravity by which one who states it may be wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeldNumber:
+    """A number that a base model holds, and how one would speak of it if it were off.
+
+    Attributes
+    ----------
+    name : str
+        Attribute of the base model.
+    columns : tuple of Column
+    phrase : str
+        What would be off.
+    sized : callable
+        The same with its size, from its coefficients.
+    key : str
+        Where the base model would leave it free.
+    largest : float
+        Error of a sensor up to which nobody can exclude it who has not stated it [s or rad]: nothing is named
+        that it explains as well. 0 of a number that is none of a sensor.
+    farthest : float
+        Error beyond which it explains nothing, in the unit of its coefficients: a gain of nought would take
+        all force out of a model.
+    """
+
+    name: str
+    columns: tuple[Column, ...]
+    phrase: str
+    sized: Callable[[Sequence[float]], str]
+    key: str
+    largest: float = 0.0
+    farthest: float = math.inf
+
+    @property
+    def as_well(self) -> str:
+        """Why a term is not taken that explains no more."""
+        least = " by less than a sample" if self.name == "delay_s" else ""
+        return f"{self.phrase}{least} would explain as much as the best term"
+
+    @property
+    def better(self) -> str:
+        """Why a term is not taken that explains less."""
+        return f"{self.phrase} would explain more than the best term"
+
+    @property
+    def as_a_law(self) -> str:
+        """Why no law is proposed that explains no more."""
+        return f"{self.phrase} does as well as any function of speed, load or position; {self.key} would tell"
+
+    @property
+    def beside_a_law(self) -> str:
+        """What is told of a law that was found with this number left free."""
+        return (
+            f"A{self.phrase[1:]} explains as much of what remains as any function of speed, load or "
+            f"position; the law is of what is left beside it, and has {self.key}."
+        )
+
+    def freed(self, base: BaseModel) -> BaseModel:
+        """Leave the number free."""
+        prior: NumberPrior = getattr(base, self.name)
+        changed: BaseModel = replace(base, **{self.name: replace(prior, std=math.inf)})  # type: ignore[arg-type]
+        return changed
+
+
+@dataclass(frozen=True, slots=True)
+class Explained:
+    """Coefficients of a number that is off, beside a model, and the share of what remains it explains."""
+
+    number: HeldNumber
+    coefficients: tuple[float, ...]
+    share: float
+
+    @property
+    def words(self) -> str:
+        """What would explain how much."""
+        return f"{self.number.sized(self.coefficients)} would explain {100.0 * self.share:.0f} %"
+
+
+def held_numbers(base: BaseModel, sample_s: float) -> tuple[HeldNumber, ...]:
+    """List the numbers that a base model holds and that records could tell.
+
+    Parameters
+    ----------
+    base : BaseModel
+    sample_s : float
+        Between two samples: a delay of less is nobody's to exclude [s].
+    """
+    turns = base.coordinate is Coordinate.ROTATION
+    unit = "N m" if turns else "N"
+    numbers = [
+        HeldNumber(
+            "delay_s", (DELAY,), "a force recorded late or early", _late_or_early, _nuisance("delay_s"),
+            sample_s,
+        ),
+        HeldNumber(
+            "force_offset", (_column("force_offset"),), "a constant force",
+            lambda size: f"a constant force of {_digits(size[0])} {unit}", _nuisance("force_offset"),
+        ),
+    ]  # fmt: skip
+    if base.response is Response.FORCE or base.inertia.is_held:  # else without any force nothing is left
+        numbers.append(
+            HeldNumber(
+                "force_gain", (_column("force_gain"),), "another gain of the force",
+                lambda size: f"a gain of the force {_percent(size[0])}", _nuisance("force_gain"),
+                farthest=FARTHEST_SHARE,
+            )
+        )  # fmt: skip
+    if turns:
+        numbers += [
+            HeldNumber(
+                "position_eccentricity", tuple((ECCENTRICITY, 0.0, number) for number in range(2)),
+                "an encoder that turns off its centre", _off_its_centre, _nuisance("position_eccentricity"),
+                FARTHEST_OFF_RAD, FARTHEST_ANGLE_RAD,
+            ),
+            HeldNumber(
+                "position_offset", (_column("position_offset"),), "a zero of the angle that is off",
+                lambda size: f"a zero of the angle {_digits(1e3 * abs(size[0]))} mrad off",
+                _nuisance("position_offset"), FARTHEST_OFF_RAD, FARTHEST_ANGLE_RAD,
+            ),
+            HeldNumber(
+                "gravity_torque", (_column("gravity_torque"),), "another torque of gravity",
+                lambda size: f"a torque of gravity {_more_or_less(size[0], unit)}",
+                "a free gravity_torque_n_m in the base model",
+                farthest=FARTHEST_SHARE * base.gravity_torque.value or math.inf,
+            ),
+        ]  # fmt: skip
+    if base.response is Response.FORCE and base.inertia.value > 0.0:
+        word, key = ("inertia", "inertia_kg_m2") if turns else ("mass", "mass_kg")
+        numbers.append(
+            HeldNumber(
+                "inertia", (_column("inertia"),), f"another {word}",
+                lambda size: f"{'an' if turns else 'a'} {word} {_percent(size[0])}",
+                f"a free {key} in the base model", farthest=FARTHEST_SHARE,
+            )
+        )  # fmt: skip
+    return tuple(one for one in numbers if _is_held(base, one.name))
+
+
+def sampling_step_s(records: Iterable[UniformRecord]) -> float:
+    """Longest time between two samples as they were recorded [s]."""
+    return max(record.finer * record.step_s for record in records)
+
+
+def explained_by(search: TermSearch, columns: Sequence[Column], number: HeldNumber) -> Explained | None:
+    """Say what a number that is off would explain of what a model leaves.
+
+    None where it does not hold from block to block, or explains little.
+    """
+    before = search.losses(columns)
+    gains = before - search.losses([*columns, *number.columns])
+    excess = float(before.sum() - search.blocks.noise.sum())
+    if not (mean_over_error(gains) >= MIN_GAIN_Z and gains.sum() >= MIN_SHARE * excess > 0.0):
+        return None
+    coefficients = fitted(search.blocks, columns, number, search.priors, search.nonnegative)
+    if math.hypot(*coefficients) > number.farthest:
+        return None
+    return Explained(number, coefficients, min(float(gains.sum()) / excess, 1.0))
+
+
+def fitted(
+    blocks: Blocks,
+    columns: Sequence[Column],
+    number: HeldNumber,
+    priors: Mapping[Column, NumberPrior],
+    nonnegative: frozenset[Column],
+) -> tuple[float, ...]:
+    """Coefficients of least squares of a number beside a model's columns."""
+    fit = fit_blocks(blocks, [*columns, *number.columns], priors, nonnegative)
+    return tuple(float(value) for value in fit.coefficients[-len(number.columns) :])
+
+
+def does_as_well(gains: Samples, other: Samples, least_share: float) -> bool:
+    """Whether gains of blocks are real and, but for chance, as large as others."""
+    is_real = mean_over_error(gains) >= MIN_GAIN_Z
+    is_enough = float(gains.sum()) >= least_share * float(other.sum())
+    return is_real and is_enough and mean_over_error(other - gains) < TIE_Z
+
+
+def told_from_sensor(
+    search: TermSearch, columns: Sequence[Column], steps: list[SelectionStep], number: HeldNumber
+) -> list[SelectionStep]:
+    """Refuse the first step of a selection where a sensor's error would explain clearly more, or as much.
+
+    The latter only if it is so small that nobody can exclude it.
+    """
+    if not steps or (best := steps[0].accepted) is None or number.largest <= 0.0:
+        return steps
+    gains = search.losses(columns) - search.losses([*columns, *number.columns])
+    if not does_as_well(gains, best.gains, MIN_TIED_SHARE):
+        return steps
+    if mean_over_error(gains - best.gains) >= TIE_Z:
+        return [replace(steps[0], accepted=None, tied_with=(), reason=number.better)]
+    coefficients = fitted(search.blocks, columns, number, search.priors, search.nonnegative)
+    if math.hypot(*coefficients) > number.largest:
+        return steps
+    return [replace(steps[0], accepted=None, tied_with=(), reason=number.as_well)]
+
+
+def held_number_notes(explained: Sequence[Explained]) -> list[str]:
+    """Say what numbers that the base model holds would explain, each by itself: those that explain most."""
+    most = max((one.share for one in explained), default=0.0)
+    return [
+        f"A{one.words[1:]} of what remains: {one.number.key} finds it with everything else."
+        for one in explained
+        if one.share >= MIN_TIED_SHARE * most
+    ]
+
+
+def blamed_on_number(steps: list[SelectionStep], explained: Sequence[Explained]) -> list[SelectionStep]:
+    """Give as the reason why no term was taken the number that would explain most of what remains."""
+    most = max(explained, key=lambda one: one.share, default=None)
+    if most is None or most.share < MOST or not steps or steps[0].accepted is not None:
+        return steps
+    return [replace(steps[0], reason=f"{most.words} of it"), *steps[1:]]
+
+
+def _is_held(base: BaseModel, name: str) -> bool:
+    prior: NumberPrior = getattr(base, name)
+    return prior.is_held and not (name == "force_offset" and base.force_offset_by_record)
+
+
+def _column(name: str) -> Column:
+    return name, 0.0, 0
+
+
+def _nuisance(name: str) -> str:
+    return f"{name} among the nuisances of the base model"
+
+
+def _late_or_early(coefficients: Sequence[float]) -> str:
+    (delay_s,) = coefficients
+    return f"a force recorded {_digits(1e3 * abs(delay_s))} ms {'late' if delay_s > 0.0 else 'early'}"
+
+
+def _off_its_centre(coefficients: Sequence[float]) -> str:
+    return f"an encoder that turns {_digits(1e3 * math.hypot(*coefficients))} mrad off its centre"
+
+
+def _percent(relative: float) -> str:
+    return f"{_digits(100.0 * abs(relative))} % {'larger' if relative > 0.0 else 'smaller'}"
+
+
+def _more_or_less(value: float, unit: str) -> str:
+    return f"{_digits(abs(value))} {unit} {'larger' if value > 0.0 else 'smaller'}"
+
+
+def _digits(value: float) -> str:
+    return f"{float(f'{value:.2g}'):g}"

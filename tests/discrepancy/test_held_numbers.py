@@ -1,0 +1,228 @@
+"""Numbers that a base model holds and that are off: they are told, and are no law and no term.
+
+Slides on paths in closed form, and a pendulum that scipy's integrator swings; what a sensor does wrong is
+done to the samples, what a base model has wrong is written into it.
+"""
+
+import math
+import re
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from impactcell.campaign import Campaign, Coordinate, Excitation
+from impactcell.discrepancy.machine import (
+    ECCENTRICITY,
+    BaseModel,
+    MachineFinding,
+    NumberPrior,
+    Response,
+    TermChoice,
+    investigate_machine,
+)
+from impactcell.discrepancy.machine.held_numbers import (
+    Explained,
+    HeldNumber,
+    held_number_notes,
+    held_numbers,
+    told_from_sensor,
+)
+from impactcell.discrepancy.machine.regression import blocks_of
+from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS
+from impactcell.discrepancy.machine.selection import select_terms
+from impactcell.discrepancy.machine.trials import TermSearch
+from impactcell.discrepancy.machine.weak_form import Rows
+from impactcell.discrepancy.report import german_machine_sentences, german_sentences, machine_sentences
+from impactcell.records import Capture, Channel, Samples
+from tests.discrepancy.test_base_model import GRAVITY, pendulum, swings
+
+COULOMB_N, MASS_KG, NOISE_N, STEP_S = 3.0, 2.0, 0.2, 4e-3
+SLIDE = BaseModel(
+    response=Response.FORCE, inertia=NumberPrior(MASS_KG, 0.1), force_offset=NumberPrior(0.0, math.inf)
+)
+PENDULUM = BaseModel(
+    coordinate=Coordinate.ROTATION,
+    inertia=NumberPrior(0.02),
+    gravity_torque=NumberPrior(0.55, math.inf),
+    position_offset=NumberPrior(0.0, 0.05),
+    force_offset=NumberPrior(0.0, 0.01),
+)
+EVERY = BaseModel(coordinate=Coordinate.ROTATION, response=Response.FORCE, inertia=NumberPrior(0.02))
+
+
+@lru_cache
+def paths() -> tuple[Samples, Samples, Samples]:
+    """Time, position and force of six paths, shapes (n,), (6, n), (6, n)."""
+    rng = np.random.default_rng(11)
+    time = np.arange(0.0, 12.0, STEP_S)
+    positions, forces = [], []
+    for _ in range(6):
+        rates = 2.0 * np.pi * rng.uniform(0.3, 1.2, 3)
+        angles = rates[:, None] * time + rng.uniform(0.0, 2.0 * np.pi, (3, 1))
+        sizes = 0.08 * rng.uniform(0.5, 1.0, 3)
+        speed = (sizes * rates) @ np.cos(angles)
+        positions.append(sizes @ np.sin(angles))
+        force = -MASS_KG * (sizes * rates**2) @ np.sin(angles) + COULOMB_N * np.tanh(speed / 1e-3)
+        forces.append(force + NOISE_N * rng.standard_normal(time.size))
+    return time, np.array(positions), np.array(forces)
+
+
+def slide(late_s: float = 0.0, zero_n: float = 0.0) -> Campaign:
+    time, positions, forces = paths()
+    shots = [
+        Capture(
+            number,
+            math.nan,
+            math.nan,
+            Channel(time, np.interp(time - late_s, time, force) + zero_n, NOISE_N),
+            Channel(time, position, 1e-7),
+        )
+        for number, (position, force) in enumerate(zip(positions, forces, strict=True), 1)
+    ]
+    return Campaign(Excitation.DRIVEN, tuple(shots))
+
+
+@lru_cache
+def turned() -> MachineFinding:
+    """A pendulum whose angle counts from 20 mrad beside the vertical, and a base model that does not know."""
+    base = replace(PENDULUM, position_offset=NumberPrior())
+    return investigate_machine(pendulum(swings(0.0, offset=0.02)), base)
+
+
+def test_a_zero_of_the_angle_that_is_held_is_told_and_is_no_law() -> None:
+    finding = turned()
+    assert (finding.verdict, finding.established) == ("unknown", ())
+    said = machine_sentences.headline(finding)
+    assert "a zero of the angle 20 mrad off would explain 100 % of it" in said
+    assert finding.law is None
+    assert finding.law_refused == (
+        "a zero of the angle that is off does as well as any function of speed, load or position; "
+        "position_offset among the nuisances of the base model would tell"
+    )
+    assert "ein um 20 mrad verschobener Nullpunkt des Winkels erklärte 100 %" in (
+        german_machine_sentences.headline(finding)
+    )
+
+
+def test_a_torque_of_gravity_that_is_held_wrong_is_told_with_its_size() -> None:
+    base = replace(PENDULUM, gravity_torque=NumberPrior(0.95 * GRAVITY))
+    finding = investigate_machine(pendulum(swings(0.0)), base)
+    off = f"a torque of gravity {0.05 * GRAVITY:.2g} N m larger would explain"
+    assert off in machine_sentences.headline(finding)
+    assert finding.law is None
+    assert "a free gravity_torque_n_m in the base model would tell" in finding.law_refused
+
+
+@pytest.mark.parametrize("mass_kg", [1.05 * MASS_KG, 0.9 * MASS_KG])
+def test_a_mass_that_is_held_wrong_is_told_and_is_no_spring(mass_kg: float) -> None:
+    """Where nothing but the mass takes force it is its product with the gain that is off; both are told."""
+    finding = investigate_machine(slide(), replace(SLIDE, inertia=NumberPrior(mass_kg)))
+    assert finding.established == ()
+    said = " ".join(finding.notes)
+    told = re.search(r"A (?:mass|gain of the force) (\S+) % (larger|smaller) would explain (\d+) %", said)
+    assert told, said
+    assert float(told[1]) == pytest.approx(100.0 * abs(MASS_KG / mass_kg - 1.0), rel=0.05)
+    assert told[2] == ("smaller" if mass_kg > MASS_KG else "larger")
+    assert int(told[3]) >= 95
+    assert "late" not in said
+    assert "early" not in said
+    assert finding.law is None
+    assert finding.law_refused.startswith(("another mass does as well", "another gain of the force does as"))
+
+
+def test_a_zero_of_the_force_that_is_held_is_told_and_is_no_law() -> None:
+    finding = investigate_machine(slide(zero_n=0.5), replace(SLIDE, force_offset=NumberPrior()))
+    assert finding.established == ()
+    assert any(note.startswith("A constant force of -0.5 N would explain") for note in finding.notes)
+    assert finding.law is None
+
+
+def test_a_late_force_is_told_and_is_no_law_of_the_speed() -> None:
+    finding = investigate_machine(slide(late_s=6e-3), SLIDE)
+    assert finding.established == ()
+    assert any(note.startswith("A force recorded 6 ms late would explain") for note in finding.notes)
+    assert finding.law is None
+    assert "delay_s among the nuisances of the base model would tell" in finding.law_refused
+
+
+def test_what_is_left_free_is_not_told_as_held() -> None:
+    assert [number.name for number in held_numbers(EVERY, 1e-3)] == [
+        "delay_s",
+        "force_offset",
+        "force_gain",
+        ECCENTRICITY,
+        "position_offset",
+        "gravity_torque",
+        "inertia",
+    ]
+    free = NumberPrior(0.02, math.inf)
+    names = [number.name for number in held_numbers(EVERY, 1e-3)]
+    for name in names:
+        base = replace(EVERY, **{name: free})  # type: ignore[arg-type]
+        assert name not in [number.name for number in held_numbers(base, 1e-3)]
+    by_record = replace(EVERY, force_offset_by_record=True)
+    assert "force_offset" not in [number.name for number in held_numbers(by_record, 1e-3)]
+
+
+def test_a_translation_has_no_angle_and_a_free_motion_no_inertia_to_tell() -> None:
+    slides = BaseModel(response=Response.FORCE, inertia=NumberPrior(2.0))
+    assert [number.name for number in held_numbers(slides, 1e-3)] == [
+        "delay_s",
+        "force_offset",
+        "force_gain",
+        "inertia",
+    ]
+    assert "inertia" not in [number.name for number in held_numbers(PENDULUM, 1e-3)]
+    pushed = BaseModel(inertia=NumberPrior(2.0, math.inf))
+    assert [number.name for number in held_numbers(pushed, 1e-3)] == ["delay_s", "force_offset"]
+    massless = replace(slides, inertia=NumberPrior(0.0))
+    assert "inertia" not in [number.name for number in held_numbers(massless, 1e-3)]
+
+
+@pytest.mark.parametrize("number", held_numbers(EVERY, 1e-3), ids=lambda number: number.name)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_each_is_said_in_german(number: HeldNumber, sign: float) -> None:
+    (english,) = held_number_notes([Explained(number, (sign * 0.004, 0.003)[: len(number.columns)], 0.6)])
+    for text, said in (
+        (english, german_sentences.note),
+        (number.beside_a_law, german_sentences.note),
+        (number.as_well, german_sentences.reason),
+        (number.better, german_sentences.reason),
+        (number.as_a_law, german_sentences.reason),
+        (f"{Explained(number, (sign * 0.004, 0.003)[: len(number.columns)], 0.6).words} of it",
+         german_sentences.reason),
+    ):  # fmt: skip
+        language, german = said(text)
+        assert language == "de", text
+        assert german.strip()
+        assert "  " not in german
+
+
+@pytest.mark.parametrize(("off", "is_refused"), [(0.04, True), (0.06, False)])
+def test_an_angle_off_by_more_than_three_degrees_is_no_sensor_s(off: float, *, is_refused: bool) -> None:
+    rng = np.random.default_rng(4)
+    wave = rng.normal(size=600)
+    speed = wave + 0.3 * rng.normal(size=600)
+    one = np.ones(600)
+    columns = {
+        (ECCENTRICITY, 0.0, 0): wave / 0.02,
+        (ECCENTRICITY, 0.0, 1): 0.0 * one,
+        ("viscous_friction", 0.0, 0): speed,
+    }
+    columns |= {(form, 0.0, number): 0.0 * one for form in FREE_FORMS for number in range(KNOTS)}
+    target = 0.5 * off * (wave + speed) / 0.02 + rng.normal(size=600)
+    rows = Rows(target, columns, 0.0 * one, np.arange(600.0), one, 0.0 * one)
+    number = np.arange(600) // 20
+    blocks = blocks_of(rows, number, {block: block % 5 for block in range(30)})
+    choice = TermChoice("viscous_friction")
+    search = TermSearch(blocks, [choice], {choice.name: (0.0,)}, {}, frozenset())
+    steps = select_terms(search, [])
+    assert steps[0].accepted is not None
+    bent = next(number for number in held_numbers(EVERY, 1e-3) if number.name == ECCENTRICITY)
+    refused = told_from_sensor(search, [], steps, bent)
+    if is_refused:
+        assert [(step.accepted, step.reason) for step in refused] == [(None, bent.as_well)]
+    else:
+        assert refused is steps
