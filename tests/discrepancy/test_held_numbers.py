@@ -27,7 +27,7 @@ from impactcell.discrepancy.machine.held_numbers import (
     HeldNumber,
     held_number_notes,
     held_numbers,
-    told_from_sensor,
+    told_from_number,
 )
 from impactcell.discrepancy.machine.regression import blocks_of
 from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS
@@ -221,7 +221,7 @@ def test_an_angle_off_by_more_than_three_degrees_is_no_sensor_s(off: float, *, i
     steps = select_terms(search, [])
     assert steps[0].accepted is not None
     bent = next(number for number in held_numbers(EVERY, 1e-3) if number.name == ECCENTRICITY)
-    refused = told_from_sensor(search, [], steps, bent)
+    refused = told_from_number(search, [], steps, bent)
     if is_refused:
         assert [(step.accepted, step.reason) for step in refused] == [(None, bent.as_well)]
     else:

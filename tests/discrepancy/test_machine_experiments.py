@@ -10,6 +10,7 @@ import pytest
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import (
     BaseModel,
+    ChosenTerm,
     MachineFinding,
     NumberPrior,
     Response,
@@ -104,6 +105,19 @@ def test_columns_that_went_together_are_to_be_set_apart() -> None:
     assert re.match(r"shot \d again, (load_n|weight_kg) at ", proposal.setting)
     assert proposal.shots > 0
     assert proposal.power >= 0.9
+
+
+def test_a_tie_beside_another_term_is_told_apart_as_well() -> None:
+    """Two laws of the speed are tied beside a third term that the base model does not have either."""
+    finding = slide(*(strokes(number, 1.0, 1.0, viscous=True) for number in (1, 2, 3)))
+    names = "viscous_friction", "quadratic_drag", "position_dependent_friction"
+    fits = MachineFits(finding.records, BASE, [TermChoice(name) for name in names], None)
+    beside = ChosenTerm(TermChoice(names[2]), fits.shapes[names[2]][0])
+    final = fits.fit((*finding.final.terms, beside), settle=False)
+    told = experiment_design.with_experiments(fits, replace(finding, final=final))
+    (proposal,) = told.experiments
+    assert set(proposal.effects) == {"viscous_friction", "quadratic_drag"}
+    assert proposal.shots == finding.experiments[0].shots
 
 
 @pytest.mark.parametrize(("widest", "shots"), [(2.5, 1), (0.0, 0)])

@@ -20,7 +20,7 @@ from impactcell.discrepancy.machine.held_numbers import (
     DELAY,
     HeldNumber,
     held_numbers,
-    told_from_sensor,
+    told_from_number,
 )
 from impactcell.discrepancy.machine.regression import blocks_of
 from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS
@@ -129,7 +129,7 @@ def test_a_search_of_one_term_and_of_none_ends() -> None:
 def test_no_term_is_named_that_a_delay_of_less_than_a_sample_explains_as_well() -> None:
     search, steps = search_of(delayed=1.0, viscous=1.0)
     assert steps[0].accepted is not None
-    refused = told_from_sensor(search, [], steps, late_by(2.5))
+    refused = told_from_number(search, [], steps, late_by(2.5))
     assert [(step.accepted, step.reason) for step in refused] == [(None, late_by(2.5).as_well)]
 
 
@@ -137,14 +137,14 @@ def test_no_term_is_named_that_any_delay_explains_better() -> None:
     search, steps = search_of(delayed=2.0, viscous=0.0)
     assert steps[0].accepted is not None
     for sample_s in (1.5, 2.5):
-        refused = told_from_sensor(search, [], steps, late_by(sample_s))
+        refused = told_from_number(search, [], steps, late_by(sample_s))
         assert [(step.accepted, step.reason) for step in refused] == [(None, late_by(sample_s).better)]
 
 
 def test_a_delay_of_more_than_a_sample_or_that_explains_less_is_no_rival() -> None:
     for (delayed, viscous), sample_s in (((1.0, 1.0), 1.5), ((0.0, 2.0), 2.5)):
         search, steps = search_of(delayed, viscous)
-        assert told_from_sensor(search, [], steps, late_by(sample_s)) is steps
+        assert told_from_number(search, [], steps, late_by(sample_s)) is steps
 
 
 def test_what_leaves_a_gap_is_not_tied_with_what_leaves_none() -> None:

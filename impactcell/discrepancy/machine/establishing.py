@@ -11,7 +11,7 @@ from impactcell.discrepancy.machine.held_numbers import (
     held_number_notes,
     held_numbers,
     sampling_step_s,
-    told_from_sensor,
+    told_from_number,
 )
 from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine
 from impactcell.discrepancy.machine.machine_fits import MachineFits
@@ -52,7 +52,7 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
         search = _search(fits, training, candidates)
         steps = select_terms(search, fits.columns(base_terms))
         for number in numbers:
-            steps = told_from_sensor(search, fits.columns(base_terms), steps, number)
+            steps = told_from_number(search, fits.columns(base_terms), steps, number)
         notes += [step.note for step in steps if step.note]
     proposed = [step.accepted.term for step in steps if step.accepted is not None]
     models, falls = _prove(fits, base_terms, proposed, seed)

@@ -197,7 +197,7 @@ class _Test:
     Attributes
     ----------
     fits : MachineFits
-        Of old and new records, the two terms its candidates.
+        Of old and new records, the two terms the first of its candidates.
     blocks : Blocks
         Its training blocks.
     terms : tuple of ChosenTerm
@@ -222,14 +222,15 @@ class _Test:
         copies = [_noisy(record, finding, rng) for _ in range(COPIES) for record in change.records]
         choices = [choice for choice in fits.candidates if choice.name in tie]
         choices.sort(key=lambda choice: tie.index(choice.name))
-        every = MachineFits((*fits.records, *copies), fits.base, choices, fits.held)
+        terms = tuple(term for term in finding.final.terms if term.choice.name != tie[0])
+        others = [term.choice for term in terms if term.choice not in fits.base.terms]
+        every = MachineFits((*fits.records, *copies), fits.base, (*choices, *others), fits.held)
         every.gravity, every.delay_s = finding.final.gravity, finding.final.delay_s
         every.doubt = fits.doubt
         every.shapes = {name: fits.shapes[name] for name in every.shapes}
         blocks, _ = every.blocks()
         if min(record.time_s[-1] for record in change.records) < MIN_BLOCKS * every.block_s:
             raise CampaignError(f"{change.words}: too short to tell anything")
-        terms = tuple(term for term in finding.final.terms if term.choice.name != tie[0])
         kinds = len(change.records)
         return cls(every, blocks, terms, len(np.unique(blocks.fold)) - COPIES * kinds, kinds, finding.seed)
 
@@ -243,7 +244,7 @@ class _Test:
         }
         search = TermSearch(
             replace(self.blocks, **part),
-            self.fits.candidates,
+            self.fits.candidates[:2],
             self.fits.shapes,
             self.fits.priors,
             self.fits.nonnegative,

@@ -209,22 +209,22 @@ def does_as_well(gains: Samples, other: Samples, least_share: float) -> bool:
     return is_real and is_enough and mean_over_error(other - gains) < TIE_Z
 
 
-def told_from_sensor(
+def told_from_number(
     search: TermSearch, columns: Sequence[Column], steps: list[SelectionStep], number: HeldNumber
 ) -> list[SelectionStep]:
-    """Refuse the first step of a selection where a sensor's error would explain clearly more, or as much.
+    """Refuse the first step of a selection where a number that is off would explain clearly more, or as much.
 
-    The latter only if it is so small that nobody can exclude it.
+    The latter only if it is a sensor's, and so small that nobody can exclude it.
     """
-    if not steps or (best := steps[0].accepted) is None or number.largest <= 0.0:
+    if not steps or (best := steps[0].accepted) is None:
         return steps
     gains = search.losses(columns) - search.losses([*columns, *number.columns])
     if not does_as_well(gains, best.gains, MIN_TIED_SHARE):
         return steps
-    if mean_over_error(gains - best.gains) >= TIE_Z:
+    size = math.hypot(*fitted(search.blocks, columns, number, search.priors, search.nonnegative))
+    if size <= number.farthest and mean_over_error(gains - best.gains) >= TIE_Z:
         return [replace(steps[0], accepted=None, tied_with=(), reason=number.better)]
-    coefficients = fitted(search.blocks, columns, number, search.priors, search.nonnegative)
-    if math.hypot(*coefficients) > number.largest:
+    if size > number.largest:
         return steps
     return [replace(steps[0], accepted=None, tied_with=(), reason=number.as_well)]
 
