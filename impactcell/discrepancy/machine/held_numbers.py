@@ -182,7 +182,7 @@ def explained_by(search: TermSearch, columns: Sequence[Column], number: HeldNumb
     before = search.losses(columns)
     gains = before - search.losses([*columns, *number.columns])
     excess = float(before.sum() - search.blocks.noise.sum())
-    if not (mean_over_error(gains) >= MIN_GAIN_Z and gains.sum() >= MIN_SHARE * excess > 0.0):
+    if not (_hold(search, gains, before) and gains.sum() >= MIN_SHARE * excess > 0.0):
         return None
     coefficients = fitted(search.blocks, columns, number, search.priors, search.nonnegative)
     if math.hypot(*coefficients) > number.farthest:
@@ -203,10 +203,9 @@ def fitted(
 
 
 def does_as_well(gains: Samples, other: Samples, least_share: float) -> bool:
-    """Whether gains of blocks are real and, but for chance, as large as others."""
-    is_real = mean_over_error(gains) >= MIN_GAIN_Z
+    """Whether gains of blocks are, but for chance, as large as others."""
     is_enough = float(gains.sum()) >= least_share * float(other.sum())
-    return is_real and is_enough and mean_over_error(other - gains) < TIE_Z
+    return is_enough and mean_over_error(other - gains) < TIE_Z
 
 
 def told_from_number(
@@ -218,8 +217,9 @@ def told_from_number(
     """
     if not steps or (best := steps[0].accepted) is None:
         return steps
-    gains = search.losses(columns) - search.losses([*columns, *number.columns])
-    if not does_as_well(gains, best.gains, MIN_TIED_SHARE):
+    before = search.losses(columns)
+    gains = before - search.losses([*columns, *number.columns])
+    if not (_hold(search, gains, before) and does_as_well(gains, best.gains, MIN_TIED_SHARE)):
         return steps
     size = math.hypot(*fitted(search.blocks, columns, number, search.priors, search.nonnegative))
     if size <= number.farthest and mean_over_error(gains - best.gains) >= TIE_Z:
@@ -245,6 +245,11 @@ def blamed_on_number(steps: list[SelectionStep], explained: Sequence[Explained])
     if most is None or most.share < MOST or not steps or steps[0].accepted is not None:
         return steps
     return [replace(steps[0], reason=f"{most.words} of it"), *steps[1:]]
+
+
+def _hold(search: TermSearch, gains: Samples, before: Samples) -> bool:
+    """Whether gains hold from block to block, as those of a term have to."""
+    return max(mean_over_error(gains), mean_over_error(search.shares(gains, before))) >= MIN_GAIN_Z
 
 
 def _is_held(base: BaseModel, name: str) -> bool:

@@ -167,9 +167,9 @@ class _LookedAt:
                 self.fits.nonnegative,
             )
             gain = float(gains.sum())
-            if number.columns == (DELAY,) and gain < NEARLY_ALL * self.excess:
-                continue
-            if gain > most and does_as_well(gains, spline.gains, MIN_SHARE_OF_FREE):
+            least = NEARLY_ALL * self.excess if number.columns == (DELAY,) else 0.0
+            is_real = gain >= least and mean_over_error(gains) >= MIN_GAIN_Z
+            if is_real and gain > most and does_as_well(gains, spline.gains, MIN_SHARE_OF_FREE):
                 held = self.training, self.model.fit.columns, number, self.fits.priors, self.fits.nonnegative
                 if math.hypot(*fitted(*held)) <= number.farthest:
                     best, most = number, gain
