@@ -181,6 +181,13 @@ def test_a_translation_has_no_angle_and_a_free_motion_no_inertia_to_tell() -> No
     assert "inertia" not in [number.name for number in held_numbers(massless, 1e-3)]
 
 
+@pytest.mark.parametrize(("stated", "farthest"), [(0.6, 0.3), (-0.6, 0.3), (0.0, math.inf)])
+def test_a_torque_of_gravity_is_off_by_half_of_what_is_stated_at_most(stated: float, farthest: float) -> None:
+    base = replace(EVERY, gravity_torque=NumberPrior(stated))
+    (gravity,) = [number for number in held_numbers(base, 1e-3) if number.name == "gravity_torque"]
+    assert gravity.farthest == pytest.approx(farthest)
+
+
 @pytest.mark.parametrize("number", held_numbers(EVERY, 1e-3), ids=lambda number: number.name)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_each_is_said_in_german(number: HeldNumber, sign: float) -> None:

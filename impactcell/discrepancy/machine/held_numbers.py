@@ -154,7 +154,7 @@ def held_numbers(base: BaseModel, sample_s: float) -> tuple[HeldNumber, ...]:
                 "gravity_torque", (_column("gravity_torque"),), "another torque of gravity",
                 lambda size: f"a torque of gravity {_more_or_less(size[0], unit)}",
                 "a free gravity_torque_n_m in the base model",
-                farthest=FARTHEST_SHARE * base.gravity_torque.value or math.inf,
+                farthest=FARTHEST_SHARE * abs(base.gravity_torque.value) or math.inf,
             ),
         ]  # fmt: skip
     if base.response is Response.FORCE and base.inertia.value > 0.0:
