@@ -36,6 +36,7 @@ from impactcell.discrepancy.machine.trials import TermSearch
 from impactcell.discrepancy.machine.weak_form import Rows
 from impactcell.discrepancy.report import german_machine_sentences, german_sentences, machine_sentences
 from impactcell.records import Capture, Channel, Samples
+from tests.benchmarks._machine_held import FAULTS, investigated
 from tests.discrepancy.test_base_model import GRAVITY, pendulum, swings
 
 COULOMB_N, MASS_KG, NOISE_N, STEP_S = 3.0, 2.0, 0.2, 4e-3
@@ -233,3 +234,10 @@ def test_an_angle_off_by_more_than_three_degrees_is_no_sensor_s(off: float, *, i
         assert [(step.accepted, step.reason) for step in refused] == [(None, bent.as_well)]
     else:
         assert refused is steps
+
+
+def test_an_encoder_is_told_from_swings_that_die_away() -> None:
+    """Its gains scatter with the amplitude from block to block, their shares of what is left do not."""
+    finding = investigated(FAULTS["an encoder 1 mrad off its centre"], 970_007)
+    assert finding.established == ()
+    assert any("An encoder that turns 1 mrad off its centre would explain" in note for note in finding.notes)
