@@ -9,15 +9,18 @@ import numpy as np
 from impactcell.discrepancy.laws import BAND, DRAWN, FittedFunction, Tangent
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.machine_fits import MachineFits
-from impactcell.discrepancy.machine.regression import PIECES_PER_BLOCK, Blocks, prior_weight
+from impactcell.discrepancy.machine.regression import (
+    PIECES_PER_BLOCK,
+    Blocks,
+    prior_weight,
+    roughness_penalty,
+)
 from impactcell.discrepancy.machine.rival_forms import SPLINE_PIECES, splines
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.records import Samples
 
 SMOOTHNESS = (1e-4, 1e-2, 1.0, 1e2)
 """Weights of the roughness that are tried, over the information that the blocks have of a coefficient [1]."""
-RIDGE = 1e-6
-"""Weight of the size of a spline, over the same: what no block sees of it stays at zero [1]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,13 +54,9 @@ def best_spline(
     fits: MachineFits, blocks: Blocks, model: FittedModel, before: Samples, form: str
 ) -> FreeSpline:
     """As smooth as blocks that it was not fitted to want it."""
-    count = SPLINE_PIECES + 3
-    places = blocks.places(spline_columns(form))
-    information = float(np.trace(blocks.products.sum(axis=0)[np.ix_(places, places)])) / count
-    bends = np.diff(np.eye(count), n=2, axis=0)
     trials = []
     for weight in SMOOTHNESS:
-        penalty = information * (weight * bends.T @ bends + RIDGE * np.eye(count))
+        penalty = roughness_penalty(blocks, spline_columns(form), weight)
         losses = np.empty(len(blocks))
         for fold, outside in zip(np.unique(blocks.fold), blocks.without_folds, strict=True):
             inside = np.flatnonzero(blocks.fold == fold)

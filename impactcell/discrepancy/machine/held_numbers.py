@@ -65,9 +65,14 @@ class HeldNumber:
     farthest: float = math.inf
 
     @property
+    def is_delay(self) -> bool:
+        """Whether it is how late the force was recorded, which is looked for within a prior only."""
+        return self.columns == (DELAY,)
+
+    @property
     def as_well(self) -> str:
         """Why a term is not taken that explains no more."""
-        least = " by less than a sample" if self.name == "delay_s" else ""
+        least = " by less than a sample" if self.is_delay else ""
         return f"{self.phrase}{least} would explain as much as the best term"
 
     @property

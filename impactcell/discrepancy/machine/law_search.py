@@ -22,7 +22,6 @@ from impactcell.discrepancy.machine.free_splines import (
     with_spline,
 )
 from impactcell.discrepancy.machine.held_numbers import (
-    DELAY,
     NEARLY_ALL,
     HeldNumber,
     does_as_well,
@@ -73,7 +72,7 @@ def with_law(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
         return finding
     freed: list[HeldNumber] = []
     outcome = _find_law(fits, finding)
-    while isinstance(outcome, HeldNumber) and outcome.columns != (DELAY,) and len(freed) < MOST_FREED:
+    while isinstance(outcome, HeldNumber) and not outcome.is_delay and len(freed) < MOST_FREED:
         freed.append(outcome)
         fits = fits.with_freed(outcome)
         outcome = _find_law(fits, finding)
@@ -102,7 +101,8 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNu
         key=lambda spline: -float(spline.gains.sum()),
     )
     looked_at = _LookedAt(fits, finding, own, training, held_out, model, before, tuple(tried))
-    least = MIN_SHARE * looked_at.excess
+    excess = float(before.sum() - training.noise.sum())
+    least = MIN_SHARE * excess
     holding = [
         spline
         for spline in tried
@@ -110,11 +110,16 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNu
     ]
     if not holding:
         return NOTHING_HELPS
-    if (number := looked_at.number_in_place_of(holding[0])) is not None:
-        return number
+    numbers = looked_at.numbers(NEARLY_ALL * excess)
+    as_well = [
+        [one for one, gains in numbers if does_as_well(gains, spline.gains, MIN_SHARE_OF_FREE)]
+        for spline in holding
+    ]
+    if as_well[0]:
+        return as_well[0][0]
     refused = ""
-    for spline in holding:
-        if refused and looked_at.number_in_place_of(spline) is not None:
+    for spline, instead in zip(holding, as_well, strict=True):
+        if instead:
             continue
         law = looked_at.law_in(spline, len(holding))
         fault = _refusal(finding, law, len(holding))
@@ -151,29 +156,24 @@ class _LookedAt:
     before: Samples
     splines: tuple[FreeSpline, ...]
 
-    @property
-    def excess(self) -> float:
-        """Squared residual of the training blocks above the noise."""
-        return float(self.before.sum() - self.training.noise.sum())
+    def numbers(self, least_of_delay: float) -> list[tuple[HeldNumber, Samples]]:
+        """List the numbers that the base model holds and that explain something, and their gains.
 
-    def number_in_place_of(self, spline: FreeSpline) -> HeldNumber | None:
-        """Of the numbers that the base model holds and that do as well as a spline the best."""
-        best, most = None, 0.0
-        for number in held_numbers(self.fits.base, sampling_step_s(self.fits.records)):
+        The one that explains most comes first; a delay is none that explains less than `least_of_delay`.
+        """
+        fits, columns = self.fits, self.model.fit.columns
+        found = []
+        for number in held_numbers(fits.base, sampling_step_s(fits.records)):
             gains = self.before - out_of_fold_losses(
-                self.training,
-                [*self.model.fit.columns, *number.columns],
-                self.fits.priors,
-                self.fits.nonnegative,
+                self.training, [*columns, *number.columns], fits.priors, fits.nonnegative
             )
-            gain = float(gains.sum())
-            least = NEARLY_ALL * self.excess if number.columns == (DELAY,) else 0.0
-            is_real = gain >= least and mean_over_error(gains) >= MIN_GAIN_Z
-            if is_real and gain > most and does_as_well(gains, spline.gains, MIN_SHARE_OF_FREE):
-                held = self.training, self.model.fit.columns, number, self.fits.priors, self.fits.nonnegative
-                if math.hypot(*fitted(*held)) <= number.farthest:
-                    best, most = number, gain
-        return best
+            least = least_of_delay if number.is_delay else 0.0
+            if float(gains.sum()) < least or mean_over_error(gains) < MIN_GAIN_Z:
+                continue
+            size = math.hypot(*fitted(self.training, columns, number, fits.priors, fits.nonnegative))
+            if size <= number.farthest:
+                found.append((number, gains))
+        return sorted(found, key=lambda one: -float(one[1].sum()))
 
     def law_in(self, spline: FreeSpline, tests: int) -> MachineLaw:
         """Condense a spline to a law, and hold it to what it was not fitted to; one of so many `tests`."""

@@ -13,6 +13,9 @@ from impactcell.records import Samples
 
 RIDGE = 1e-9
 """Relative ridge of the normal equations: of columns that cannot be told apart neither runs away [1]."""
+SIZE_WEIGHT = 1e-6
+"""Weight of the size of a free function, over the information that blocks have of its pieces: what no block
+sees of it stays at zero [1]."""
 PIECES_PER_BLOCK = 4.0
 """Independent pieces that a block counts for where a prior is weighed against it [1]."""
 BLOCKS_OF_RECORD = 100_000
@@ -147,6 +150,18 @@ def fit_blocks(
     spread = inverse @ (scores.T @ scores) @ inverse * len(blocks) / freedom
     half = student.ppf(0.975, freedom) * np.sqrt(np.maximum(np.diag(spread), 0.0))
     return LinearFit(tuple(columns), coefficients, coefficients - half, coefficients + half, at_bound)
+
+
+def roughness_penalty(blocks: Blocks, columns: Sequence[Column], weight: float) -> Samples:
+    """Quadratic form of the bends of a function, made of pieces in a row, and of its size, shape (p, p).
+
+    `weight` of the bends and `SIZE_WEIGHT` of the size are over the information that blocks have of a piece.
+    """
+    places, count = blocks.places(columns), len(columns)
+    information = float(np.trace(blocks.products.sum(axis=0)[np.ix_(places, places)])) / count
+    bends = np.diff(np.eye(count), n=2, axis=0)
+    penalty: Samples = information * (weight * bends.T @ bends + SIZE_WEIGHT * np.eye(count))
+    return penalty
 
 
 def out_of_fold_losses(

@@ -8,14 +8,14 @@ import numpy as np
 
 from impactcell.discrepancy.machine.base_model import NumberPrior, TermChoice
 from impactcell.discrepancy.machine.law_terms import term_of
-from impactcell.discrepancy.machine.regression import Blocks, out_of_fold_losses
+from impactcell.discrepancy.machine.regression import Blocks, out_of_fold_losses, roughness_penalty
 from impactcell.discrepancy.machine.rival_forms import KNOTS
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.records import Samples
 
-STRAIGHT, SMALL = 1e-4, 1e-6
-"""Weights of a free form's bends and of its size, over the information that blocks have of a corner: where no
-block has been they decide, and nowhere else [1]."""
+STRAIGHT = 1e-4
+"""Weight of a free form's bends, over the information that blocks have of a corner: where no block has been
+it decides, and nowhere else [1]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,12 +95,9 @@ class TermSearch:
         Its corners bend as little as blocks want it: where no other record has been, it goes on straight.
         """
         corners = [(form, 0.0, number) for number in range(KNOTS)]
-        places = self.blocks.places(corners)
-        information = float(np.trace(self.blocks.products.sum(axis=0)[np.ix_(places, places)])) / KNOTS
-        bends = np.diff(np.eye(KNOTS), n=2, axis=0)
         every = [*columns, *corners]
         penalty = np.zeros((len(every), len(every)))
-        penalty[-KNOTS:, -KNOTS:] = information * (STRAIGHT * bends.T @ bends + SMALL * np.eye(KNOTS))
+        penalty[-KNOTS:, -KNOTS:] = roughness_penalty(self.blocks, corners, STRAIGHT)
         return out_of_fold_losses(self.blocks, every, self.priors, self.nonnegative, penalty)
 
     def gap(self, columns: Sequence[Column]) -> float:
