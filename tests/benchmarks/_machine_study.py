@@ -270,6 +270,7 @@ def _outcome(finding: MachineFinding) -> dict[str, Any]:
         "established": list(finding.established),
         "tied": {name: list(rivals) for name, rivals in finding.tied_with.items()},
         "gap": [finding.fall.before, finding.fall.after],
+        "rmse": [error.rmse for error in finding.simulated],
         "reason": finding.steps[-1].reason if finding.steps else "",
         "law": _law(finding),
     }

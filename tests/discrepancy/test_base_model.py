@@ -22,6 +22,7 @@ from impactcell.discrepancy.machine import (
     simulate_held_out,
 )
 from impactcell.discrepancy.machine.uniform_records import uniform_records
+from impactcell.discrepancy.report import german_sentences
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.errors import CampaignError, SettingsError
 from impactcell.records import Capture, Channel
@@ -246,6 +247,24 @@ def test_a_column_that_no_shot_states_and_a_part_at_rest_are_refused() -> None:
     )
     with pytest.raises(CampaignError):
         investigate_machine(replace(seal(0.8), shots=at_rest), SEAL)
+
+
+def test_nothing_is_judged_by_a_column_that_a_shot_leaves_empty() -> None:
+    shots = tuple(
+        replace(shot, covariates={**shot.covariates, "oil_c": math.nan if shot.cycle == 3 else 20.0 + place})
+        for place, shot in enumerate(seal(0.8).shots)
+    )
+    finding = investigate_machine(replace(seal(0.8), shots=shots), SEAL)
+    assert finding.established == ("covariate_friction(pressure_bar)",)
+    note = "The column 'oil_c' of shots.csv is empty in 1 of 4 shots: nothing is judged by it."
+    assert note in finding.notes
+    assert german_sentences.note(note) == (
+        "de",
+        "Die Spalte 'oil_c' von shots.csv ist in 1 von 4 Messungen leer: Nach ihr wird nichts beurteilt.",
+    )
+    base = replace(SEAL, terms=(TermChoice("covariate_friction", "oil_c"),))
+    with pytest.raises(CampaignError, match=r"'oil_c' of shots.csv, which shots 3 do not"):
+        investigate_machine(replace(seal(0.8), shots=shots), base)
 
 
 def test_base_model_is_written_as_it_was_read(tmp_path: Path) -> None:

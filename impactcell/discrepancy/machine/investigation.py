@@ -65,6 +65,7 @@ def investigate_machine(
     base, notes = hold_what_cannot_be_seen(base, records)
     records, notes = _with_samples_enough(records, notes)
     candidates = _candidates(base, records)
+    notes += _notes_of_columns_with_gaps(records)
     fits = MachineFits(records, base, candidates, _held_records(records, train, test))
     _check_blocks(fits)
     finding = establish(fits, [*notes_of(data_faults), *notes], seed)
@@ -168,8 +169,10 @@ def _with_samples_enough(
 
 def _candidates(base: BaseModel, records: Sequence[UniformRecord]) -> tuple[TermChoice, ...]:
     """Terms that may be named: of the catalogue, those that such records can test."""
-    columns = sorted({name for record in records for name in record.covariates})
-    varying = [name for name in columns if len({record.covariates.get(name) for record in records}) > 1]
+    columns = _columns(records)
+    varying = [
+        name for name, values in columns.items() if len(values) == len(records) and len(set(values)) > 1
+    ]
     own = {choice.name for choice in base.terms}
     choices = []
     for identifier, term in CATALOGUE.items():
@@ -182,6 +185,24 @@ def _candidates(base: BaseModel, records: Sequence[UniformRecord]) -> tuple[Term
         else:
             choices.append(TermChoice(identifier))
     return tuple(choice for choice in choices if choice.name not in own)
+
+
+def _columns(records: Sequence[UniformRecord]) -> dict[str, list[float]]:
+    """Values of each column of numbers of `shots.csv`, of the records that state it."""
+    names = sorted({name for record in records for name in record.covariates})
+    return {
+        name: [record.covariates[name] for record in records if name in record.covariates] for name in names
+    }
+
+
+def _notes_of_columns_with_gaps(records: Sequence[UniformRecord]) -> list[str]:
+    """Say by which columns nothing is judged, since not every shot states them."""
+    return [
+        f"The column {name!r} of shots.csv is empty in {len(records) - len(values)} of {len(records)} shots: "
+        "nothing is judged by it."
+        for name, values in _columns(records).items()
+        if len(values) < len(records)
+    ]
 
 
 def _has_load(base: BaseModel) -> bool:

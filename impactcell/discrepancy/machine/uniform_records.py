@@ -163,7 +163,11 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
             channels, cleaned, (white_noise_std, drive_noise_std), strict=False
         )
     ]
-    covariates = {name: value for name, value in shot.covariates.items() if isinstance(value, float)}
+    covariates = {
+        name: value
+        for name, value in shot.covariates.items()
+        if isinstance(value, float) and math.isfinite(value)
+    }
     gain = 1.0 + base.force_gain.value
     return UniformRecord(
         shot=shot.cycle,

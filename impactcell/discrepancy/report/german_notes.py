@@ -68,6 +68,8 @@ NOTES: Final[Patterns] = (
     (r"Outliers of (\d+) shots are left out of the fits\.", r"Ausreißer werden nicht angepasst (Stöße: \1)."),
     (r"(\d+) of (\d+) samples stood far from their neighbours and were replaced\.",
      r"\1 von \2 Messwerten lagen weit von ihren Nachbarn und wurden ersetzt."),
+    (r"The column '(.+)' of shots\.csv is empty in (\d+) of (\d+) shots: nothing is judged by it\.",
+     r"Die Spalte '\1' von shots.csv ist in \2 von \3 Messungen leer: Nach ihr wird nichts beurteilt."),
     (r"The force is held from one update to the next in (\d+) of (\d+) records: .*",
      (r"Die Kraft wird in \1 von \2 Messungen von einem Wert zum nächsten gehalten: Sie gilt als Vorgabe "
       r"ohne Rauschen, die von ihrem Messwert bis zum nächsten wirkt.")),
