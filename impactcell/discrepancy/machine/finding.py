@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 from impactcell.discrepancy.data import MIN_HELD_OUT, MIN_TRAINING
 from impactcell.discrepancy.laws import FittedFunction
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
+from impactcell.discrepancy.machine.motion_scale import MotionScale
 from impactcell.discrepancy.machine.regression import Blocks, LinearFit
 from impactcell.discrepancy.machine.selection import SelectionStep
 from impactcell.discrepancy.machine.trials import ChosenTerm
-from impactcell.discrepancy.machine.uniform_records import MotionScale, UniformRecord
+from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.discrepancy.search import MAX_EXPECTED_GAP, MAX_P_VALUE, MIN_CLOSED_SHARE, Proposal
 from impactcell.german.open_loop import POOR_FIT_PERCENT

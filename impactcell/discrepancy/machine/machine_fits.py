@@ -14,6 +14,7 @@ from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.held_numbers import DELAY, HeldNumber
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.model_forces import friction_at_rest
+from impactcell.discrepancy.machine.motion_scale import motion_scale
 from impactcell.discrepancy.machine.nuisance_priors import nuisance_priors
 from impactcell.discrepancy.machine.record_constants import without_constants
 from impactcell.discrepancy.machine.regression import (
@@ -26,7 +27,7 @@ from impactcell.discrepancy.machine.regression import (
 )
 from impactcell.discrepancy.machine.rival_forms import Basis
 from impactcell.discrepancy.machine.trials import ChosenTerm
-from impactcell.discrepancy.machine.uniform_records import UniformRecord, motion_scale
+from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import (
     Column,
     IndexArray,

@@ -8,14 +8,10 @@ import numpy as np
 
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
 from impactcell.discrepancy.machine.law_terms import term_of
+from impactcell.discrepancy.machine.motion_scale import MotionScale, carried_load, half_supports
 from impactcell.discrepancy.machine.smoothing import smoothed_speed, speed_noise
 from impactcell.discrepancy.machine.terms import MotionState
-from impactcell.discrepancy.machine.uniform_records import (
-    MotionScale,
-    UniformRecord,
-    carried_load,
-    half_supports,
-)
+from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import direction_of_motion
 from impactcell.records import Samples
 

@@ -24,14 +24,10 @@ from impactcell.discrepancy.machine.held_out_stretch import (
     settled_start,
 )
 from impactcell.discrepancy.machine.model_forces import law_of
+from impactcell.discrepancy.machine.motion_scale import MotionScale, carried_load, half_supports
 from impactcell.discrepancy.machine.regression import PRIOR_REACH
 from impactcell.discrepancy.machine.smoothing import averaged, smoothed_acceleration, smoothed_speed
-from impactcell.discrepancy.machine.uniform_records import (
-    MotionScale,
-    UniformRecord,
-    carried_load,
-    half_supports,
-)
+from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, direction_of_motion, eccentricity_waves
 from impactcell.records import Samples
 

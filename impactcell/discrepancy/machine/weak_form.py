@@ -13,16 +13,11 @@ import numpy as np
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
 from impactcell.discrepancy.machine.law_terms import term_of
+from impactcell.discrepancy.machine.motion_scale import MotionScale, carried_load, half_supports, motion_scale
 from impactcell.discrepancy.machine.rival_forms import Basis, free_columns, hats
 from impactcell.discrepancy.machine.smoothing import smoothed_speed, test_function, test_slope
 from impactcell.discrepancy.machine.terms import MotionState, Term
-from impactcell.discrepancy.machine.uniform_records import (
-    MotionScale,
-    UniformRecord,
-    carried_load,
-    half_supports,
-    motion_scale,
-)
+from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.records import Samples
 
 IndexArray = np.ndarray[tuple[int], np.dtype[np.int64]]

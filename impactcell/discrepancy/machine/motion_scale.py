@@ -1,0 +1,178 @@
+"""Sizes of a machine's motion: its period, speed, load and range, and over how long its rows average."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from impactcell.discrepancy.machine.base_model import Response
+from impactcell.discrepancy.machine.channel_values import LARGEST
+from impactcell.discrepancy.machine.smoothing import smoothed_acceleration, speed_noise
+from impactcell.discrepancy.machine.uniform_records import MIN_HALF_SUPPORT, UniformRecord
+from impactcell.errors import CampaignError
+from impactcell.records import Samples
+
+PERIODS_PER_SUPPORT = 0.25
+"""Support of a test function over the period of the motion: a half swing has four rows [1]."""
+SPEED_SUPPORT_SHARE = 0.25
+"""Support by which a speed is smoothed at most, over that of a test function: direction turns fast [1]."""
+MIN_SPEED_SUPPORT = 3
+"""And at least, on either side [samples]."""
+MAX_SPEED_NOISE = 0.001
+"""Noise of a speed over the largest one, down to which it is smoothed: a fifth of what is turning [1]."""
+MAX_HIDDEN_SHARE = 0.25
+"""Share of the force's mean square that averaging over a test function may hide of the inertial force [1]."""
+SPANS_PER_PERIOD = 11.0
+"""Second differences over an eleventh of the period average as a test function of a quarter of it: the
+triangle's standard deviation of span/sqrt(6) is that of (1 - s²)^4, half its support over sqrt(11)."""
+LARGEST_ACCELERATION = 0.97
+"""Share of the samples below what counts as the largest acceleration: a spike touches three of them [1]."""
+MIN_SPAN = 2
+"""Least span of a second difference [samples]: of one it is noise as a rule."""
+FINEST = 16
+"""Steps of sqrt(2) by which averaging is shortened at most: to a 256th [1]."""
+LEVELLED = 1.02
+"""Growth in such a step below which all of the acceleration is resolved [1]."""
+MAX_NOISE_SHARE = 0.1
+"""Share of the sensor's noise in the mean square of an acceleration beyond which it says nothing [1]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionScale:
+    """Sizes of the motion over all records.
+
+    Attributes
+    ----------
+    period_s : float
+        2 pi std(q) / std(q'), or less where accelerations are much shorter (`resolving_period`).
+    speed, load : float
+        Largest speed and load.
+    low, high : float
+        Range of positions.
+    """
+
+    period_s: float
+    speed: float
+    load: float
+    low: float
+    high: float
+
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Range of each covariate that a function may be one of."""
+        return {"speed": (0.0, self.speed), "load": (0.0, self.load), "position": (self.low, self.high)}
+
+
+def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: float) -> MotionScale:
+    """Sizes of the motion over all records, where gravity's torque is about `gravity`.
+
+    Raises
+    ------
+    CampaignError
+        Nothing moves.
+    """
+    moving = [record for record in records if np.ptp(record.position) > 0.0]
+    if not moving:
+        raise CampaignError("no record shows any motion")
+    # Coarse speeds: over a twentieth of a record's samples at most, so that quantised positions do not count.
+    speeds, places = [], []
+    for record in moving:
+        width = max(len(record.position) // 200, 1)
+        speeds.append((record.position[width:] - record.position[:-width]) / (width * record.step_s))
+        places.append(record.position - record.position.mean())
+    speed = np.concatenate(speeds)
+    period = 2.0 * math.pi * float(np.concatenate(places).std()) / float(np.sqrt(np.mean(speed**2)))
+    position = np.concatenate([record.position for record in records])
+    scale = MotionScale(
+        resolving_period(moving, period),
+        float(np.quantile(np.abs(speed), LARGEST)),
+        0.0,
+        float(position.min()),
+        float(position.max()),
+    )
+    loads = [carried_load(response, record, record.force, (gravity, scale)) for record in records]
+    return replace(scale, load=float(np.quantile(np.concatenate(loads), LARGEST)))
+
+
+def resolving_period(records: Sequence[UniformRecord], period_s: float) -> float:
+    """Give the longest period, at most `period_s`, whose test functions still show the accelerations.
+
+    An axis that is ramped up within a tenth of a second and then runs for seconds has a period of seconds:
+    averaged over a quarter of it, the ramps are gone, and with them what tells inertia from friction. The
+    averaging is shortened until it hides at most `MAX_HIDDEN_SHARE` of the mean square of the force, inertia
+    times acceleration over ever shorter spans.
+    """
+    sizes: list[float] = []
+    for place in range(FINEST + 1):
+        size = _inertial_force(records, period_s / math.sqrt(2.0) ** place)
+        if size is None:
+            break
+        sizes.append(size)
+        if place and size < LEVELLED * sizes[-2]:
+            break
+    if not sizes:
+        return period_s
+    whole = max(sizes)
+    force = np.concatenate([record.force - record.force.mean() for record in records])
+    hidden = whole - MAX_HIDDEN_SHARE * max(whole, float(np.mean(force**2)))
+    return period_s / math.sqrt(2.0) ** next(place for place, size in enumerate(sizes) if size >= hidden)
+
+
+def _inertial_force(records: Sequence[UniformRecord], period_s: float) -> float | None:
+    """Mean square of inertia times acceleration, averaged as over a test function; None where it is noise."""
+    total, noise, count = 0.0, 0.0, 0
+    for record in records:
+        span = round(period_s / SPANS_PER_PERIOD / record.step_s)
+        if span < MIN_SPAN:
+            return None
+        if 4 * span > len(record.position):
+            continue
+        second = (
+            record.position[2 * span :] - 2.0 * record.position[span:-span] + record.position[: -2 * span]
+        )
+        # What is left of a spike is a few large ones of them, and the finer the span the larger.
+        second = np.minimum(np.abs(second), np.quantile(np.abs(second), LARGEST_ACCELERATION))
+        scale = (record.inertia / (span * record.step_s) ** 2) ** 2
+        total += scale * float(second @ second)
+        noise += scale * 6.0 * len(second) * record.noise[0] ** 2  # variance of x - 2 y + z
+        count += len(second)
+    if not count or noise > MAX_NOISE_SHARE * total:
+        return None
+    return (total - noise) / count
+
+
+def half_supports(record: UniformRecord, scale: MotionScale) -> tuple[int, int]:
+    """Half support of a test function and of the smoothing of speeds [samples]."""
+    half = max(int(0.5 * PERIODS_PER_SUPPORT * scale.period_s / record.step_s), MIN_HALF_SUPPORT)
+    half = min(half, len(record.position) // 8)
+    widest = max(int(SPEED_SUPPORT_SHARE * half), MIN_SPEED_SUPPORT)
+    narrow = MIN_SPEED_SUPPORT
+    while (
+        narrow < widest
+        and speed_noise(narrow, record.step_s) * record.noise[0] > MAX_SPEED_NOISE * scale.speed
+    ):
+        narrow += 1
+    return half, narrow
+
+
+def carried_load(
+    response: Response, record: UniformRecord, force: Samples, gravity_and_scale: tuple[float, MotionScale]
+) -> Samples:
+    """|F + G sin(q - q_0)|, by which gear or guide is loaded, shape (n,).
+
+    Where the drive is predicted, F is what a machine without friction needs, I q'' + G sin(q - q_0): a
+    measured force holds the friction itself, and friction that goes by it would explain any friction. Nothing
+    is known of a load then where no gravity acts.
+    """
+    gravity, scale = gravity_and_scale
+    weight = gravity * np.sin(record.position)
+    if response is Response.POSITION:
+        return np.abs(force + weight)
+    if gravity == 0.0:
+        return np.zeros(weight.shape)
+    half, narrow = half_supports(record, scale)
+    accelerating = record.inertia * smoothed_acceleration(
+        record.position, max(half // 2, narrow), record.step_s
+    )
+    return np.abs(accelerating + 2.0 * weight)
