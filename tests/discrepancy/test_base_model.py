@@ -15,10 +15,14 @@ from impactcell.campaign import Campaign, Coordinate, Excitation, write
 from impactcell.cli.app import app
 from impactcell.discrepancy.machine import (
     BaseModel,
+    FittedModel,
+    MachineFinding,
     NumberPrior,
+    OpenLoopError,
     Response,
     TermChoice,
     investigate_machine,
+    investigation,
     simulate_held_out,
 )
 from impactcell.discrepancy.machine.uniform_records import uniform_records
@@ -168,6 +172,30 @@ def test_friction_by_a_column_is_told_from_the_speed_that_falls_with_it() -> Non
     place = [column[0] for column in finding.final.fit.columns].index("covariate_friction(pressure_bar)")
     assert finding.final.fit.low[place] < 0.8 < finding.final.fit.high[place]
     assert not investigate_machine(seal(0.0), SEAL).established
+
+
+def test_what_the_simulation_contradicts_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The simulation of held-out records is made to err more with the friction by the column."""
+    name, rise = "covariate_friction(pressure_bar)", [1.05]
+
+    def erring(finding: MachineFinding, model: FittedModel) -> OpenLoopError:
+        error = simulate_held_out(finding, model)
+        added = any(term.choice.name == name for term in model.terms)
+        return replace(error, rmse=rise[-1] if added else 1.0)
+
+    monkeypatch.setattr(investigation, "simulate_held_out", erring)
+    assert investigate_machine(seal(0.8), SEAL).established == (name,)
+    rise.append(1.2)
+    finding = investigate_machine(seal(0.8), SEAL)
+    assert finding.verdict == "unknown"
+    assert finding.established == ()
+    assert finding.unconfirmed == (name,)
+    assert finding.fall.after == finding.fall.before
+    note = next(note for note in finding.notes if "simulated open loop" in note)
+    assert note.endswith("records are 1.2 N off with it, 1 without; it is not named.")
+    language, said = german_sentences.note(note)
+    assert language == "de"
+    assert "mit ihm um 1,2 N daneben, ohne um 1; es wird nicht genannt" in said
 
 
 def test_whole_way_by_the_command_line(tmp_path: Path) -> None:

@@ -120,3 +120,11 @@ class BaseModel:
     delay_s: NumberPrior = NumberPrior()
     block_s: float = math.nan
     name: str = "base"
+
+    @property
+    def unit(self) -> str:
+        """Unit of what is predicted."""
+        is_rotation = self.coordinate is Coordinate.ROTATION
+        if self.response is Response.FORCE:
+            return "N m" if is_rotation else "N"
+        return "rad" if is_rotation else "m"

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import takewhile
 
 from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
@@ -29,8 +30,13 @@ WEIGHINGS = 2
 """Rounds of weights by what a model leaves, and of a model by these weights [1]."""
 
 
-def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
+def establish(
+    fits: MachineFits, notes: list[str], seed: int, contradicted: frozenset[str] = frozenset()
+) -> MachineFinding:
     """Select on training blocks, prove on held-out ones.
+
+    `contradicted` are names of terms that join no model, nor what was found beside them: a simulation errs
+    more with them.
 
     The rows are weighed by what the base model leaves of them while terms are looked for; what is found is
     proved once more with weights by its own remainder, so that gaps before and after have the same ones.
@@ -55,7 +61,8 @@ def establish(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
             steps = told_from_number(search, fits.columns(base_terms), steps, number)
         notes += [step.note for step in steps if step.note]
     proposed = [step.accepted.term for step in steps if step.accepted is not None]
-    models, falls = _prove(fits, base_terms, proposed, seed)
+    proven = [*takewhile(lambda term: term.choice.name not in contradicted, proposed)]
+    models, falls = _prove(fits, base_terms, proven, seed)
     for _ in range(WEIGHINGS if falls else 0):
         fits.weigh(models[-1])
         models, falls = _prove(

@@ -89,8 +89,8 @@ class HeldNumber:
     def beside_a_law(self) -> str:
         """What is told of a law that was found with this number left free."""
         return (
-            f"A{self.phrase[1:]} explains as much of what remains as any function of speed, load or "
-            f"position; the law is of what is left beside it, and has {self.key}."
+            f"A{self.phrase[1:]} explains nearly all that any function of speed, load or position would; "
+            f"the law is of what is left beside it, and has {self.key}."
         )
 
     def freed(self, base: BaseModel) -> BaseModel:

@@ -20,10 +20,14 @@ from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
 from impactcell.errors import CampaignError
+from impactcell.physics.effect_names import in_words
 from impactcell.quality import Fault, inspect_campaign, notes_of, refuse_unusable
 
 MANY_RECORDS = 8
 """Records from which on whole ones are held out; of fewer, the last third of each [1]."""
+MAX_RISE = 1.1
+"""Times by which the held-out simulation may err more with what is named than without. In 37 of 37 campaigns
+with seeds for tuning in which the name was right it erred less [1]."""
 
 
 def investigate_machine(
@@ -68,10 +72,26 @@ def investigate_machine(
     notes += _notes_of_columns_with_gaps(records)
     fits = MachineFits(records, base, candidates, _held_records(records, train, test))
     _check_blocks(fits)
-    finding = establish(fits, [*notes_of(data_faults), *notes], seed)
-    models = finding.nominal, finding.final
-    finding = replace(finding, simulated=tuple(simulate_held_out(finding, model) for model in models))
+    finding = _established(fits, [*notes_of(data_faults), *notes], seed)
     return with_experiments(fits, with_law(fits, finding))
+
+
+def _established(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
+    """Establish what the simulation of what was held out does not contradict."""
+    contradicted, said = frozenset[str](), list[str]()
+    while True:
+        finding = establish(fits, notes, seed, contradicted)
+        models = finding.nominal, finding.final
+        finding = replace(finding, simulated=tuple(simulate_held_out(finding, model) for model in models))
+        before, after = (error.rmse for error in finding.simulated)
+        if not finding.established or after <= MAX_RISE * before:
+            return replace(finding, notes=(*finding.notes, *said))
+        last = finding.established[-1]
+        contradicted |= {last}
+        said.append(
+            f"{in_words(last)}: held-out blocks want it, but simulated open loop, held-out records are "
+            f"{after:.3g} {finding.base.unit} off with it, {before:.3g} without; it is not named."
+        )
 
 
 def _check_columns(base: BaseModel, records: Sequence[UniformRecord]) -> None:

@@ -29,9 +29,10 @@ from impactcell.discrepancy.machine.held_numbers import (
     held_numbers,
     sampling_step_s,
 )
+from impactcell.discrepancy.machine.law_refusal import GIVES_ENERGY, refusal_of
 from impactcell.discrepancy.machine.law_terms import LAW_PREFIX, term_of
+from impactcell.discrepancy.machine.look_alikes import one_way_note
 from impactcell.discrepancy.machine.machine_fits import MachineFits
-from impactcell.discrepancy.machine.model_forces import resistance
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
 from impactcell.discrepancy.machine.regression import (
     Blocks,
@@ -57,10 +58,6 @@ MOST_FREED = 3
 """Numbers that the base model holds, and beside which a law is looked for."""
 NOTHING_HELPS = "no function of speed, load or position helps block after block that it was not fitted to"
 """Why no law is proposed where no spline holds."""
-GIVES_ENERGY = "with the law that fits best friction would give energy in the range that was gone through"
-"""Why no law is proposed where held-out blocks confirm one that cannot be."""
-NEGATIVE_SHARE = 0.02
-"""Share of the largest friction by which it may be below zero before it gives energy [1]."""
 
 
 def with_law(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
@@ -78,6 +75,8 @@ def with_law(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
         outcome = _find_law(fits, finding)
     if isinstance(outcome, MachineLaw):
         notes = (*finding.notes, *(number.beside_a_law for number in freed))
+        if COVARIATES[outcome.place.removeprefix(LAW_PREFIX)] == "position":
+            notes = (*notes, *one_way_note(finding.records))
         law = replace(outcome, beside=tuple(number.phrase for number in freed))
         return replace(finding, law=law, notes=notes)
     if isinstance(outcome, HeldNumber):
@@ -111,10 +110,7 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNu
     if not holding:
         return NOTHING_HELPS
     numbers = looked_at.numbers(NEARLY_ALL * excess)
-    as_well = [
-        [one for one, gains in numbers if does_as_well(gains, spline.gains, MIN_SHARE_OF_FREE)]
-        for spline in holding
-    ]
+    as_well = [[one for one, gains in numbers if _stands_for(one, gains, spline)] for spline in holding]
     if as_well[0]:
         return as_well[0][0]
     refused = ""
@@ -122,13 +118,19 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNu
         if instead:
             continue
         law = looked_at.law_in(spline, len(holding))
-        fault = _refusal(finding, law, len(holding))
+        fault = refusal_of(finding, law, len(holding))
         if not fault:
             return law
         refused = refused or fault
         if fault == GIVES_ENERGY:  # held-out blocks want it all the same: it stands for something else
             break
     return refused
+
+
+def _stands_for(number: HeldNumber, gains: Samples, spline: FreeSpline) -> bool:
+    """Whether a number does as well as a spline, or leaves so little of it that a law begins beside it."""
+    nearly_all = float(gains.sum()) >= NEARLY_ALL * float(spline.gains.sum())
+    return does_as_well(gains, spline.gains, MIN_SHARE_OF_FREE) or (nearly_all and not number.is_delay)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,21 +213,6 @@ def _gone_through(finding: MachineFinding) -> list[str]:
     """Free forms whose covariate has a range."""
     ranges = finding.scale.ranges
     return [form for form in FREE_FORMS if ranges[COVARIATES[form]][1] > ranges[COVARIATES[form]][0]]
-
-
-def _refusal(finding: MachineFinding, law: MachineLaw, tests: int) -> str:
-    """Say why a law, one of so many that are tested, is not proposed; empty if it is."""
-    if not law.fall.is_real_among(tests):
-        return "on held-out blocks the gap does not fall by more than chance"
-    if law.simulated is None:
-        return ""
-    without, with_it = law.simulated
-    if not with_it.rmse < without.rmse:
-        return "simulated open loop, the law that fits best errs no less on held-out records than no law"
-    least, largest = resistance(finding, law.model)
-    if least < -NEGATIVE_SHARE * largest:
-        return GIVES_ENERGY
-    return ""
 
 
 def _is_resolved(form: RankedForm, tested: tuple[float, float]) -> bool:

@@ -22,7 +22,7 @@ MIN_SPEED_SUPPORT = 3
 MAX_SPEED_NOISE = 0.001
 """Noise of a speed over the largest one, down to which it is smoothed: a fifth of what is turning [1]."""
 MAX_HIDDEN_SHARE = 0.25
-"""Share of the force's mean square that averaging over a test function may hide of the inertial force [1]."""
+"""Share of the mean square of what moves the part that averaging over a test function may hide [1]."""
 SPANS_PER_PERIOD = 11.0
 """Second differences over an eleventh of the period average as a test function of a quarter of it: the
 triangle's standard deviation of span/sqrt(6) is that of (1 - s²)^4, half its support over sqrt(11)."""
@@ -85,7 +85,7 @@ def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: 
     period = 2.0 * math.pi * float(np.concatenate(places).std()) / float(np.sqrt(np.mean(speed**2)))
     position = np.concatenate([record.position for record in records])
     scale = MotionScale(
-        resolving_period(moving, period),
+        resolving_period(moving, period, response),
         float(np.quantile(np.abs(speed), LARGEST)),
         0.0,
         float(position.min()),
@@ -95,13 +95,14 @@ def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: 
     return replace(scale, load=float(np.quantile(np.concatenate(loads), LARGEST)))
 
 
-def resolving_period(records: Sequence[UniformRecord], period_s: float) -> float:
+def resolving_period(records: Sequence[UniformRecord], period_s: float, response: Response) -> float:
     """Give the longest period, at most `period_s`, whose test functions still show the accelerations.
 
     An axis that is ramped up within a tenth of a second and then runs for seconds has a period of seconds:
     averaged over a quarter of it, the ramps are gone, and with them what tells inertia from friction. The
-    averaging is shortened until it hides at most `MAX_HIDDEN_SHARE` of the mean square of the force, inertia
-    times acceleration over ever shorter spans.
+    averaging is shortened until it hides at most `MAX_HIDDEN_SHARE` of the mean square of inertia times
+    acceleration over ever shorter spans, or where the force is predicted of that of the force, if it is more:
+    of a drive that spins up friction takes nearly all, and the position follows from the rest.
     """
     sizes: list[float] = []
     for place in range(FINEST + 1):
@@ -114,8 +115,11 @@ def resolving_period(records: Sequence[UniformRecord], period_s: float) -> float
     if not sizes:
         return period_s
     whole = max(sizes)
-    force = np.concatenate([record.force - record.force.mean() for record in records])
-    hidden = whole - MAX_HIDDEN_SHARE * max(whole, float(np.mean(force**2)))
+    counted = whole
+    if response is Response.FORCE:
+        force = np.concatenate([record.force - record.force.mean() for record in records])
+        counted = max(whole, float(np.mean(force**2)))
+    hidden = whole - MAX_HIDDEN_SHARE * counted
     return period_s / math.sqrt(2.0) ** next(place for place, size in enumerate(sizes) if size >= hidden)
 
 

@@ -97,15 +97,22 @@ NOTES: Final[Patterns] = (
     (r"(.+): on these records like inertia, gravity or drive, and so not looked for\.",
      lambda m: f"{_terms(m[1])}: auf diesen Messungen wie Trägheit, Schwerkraft oder Antrieb, darum nicht "
      "gesucht."),
+    ((r"(.+): held-out blocks want it, but simulated open loop, held-out records are (\S+ .+?) off with it, "
+      r"(\S+) without; it is not named\."),
+     lambda m: f"{_terms(m[1])}: Zurückgehaltene Blöcke wollen es, aber ohne Rückführung simuliert liegen "
+     f"zurückgehaltene Messungen mit ihm um {m[2]} daneben, ohne um {m[3]}; es wird nicht genannt."),
     (r"(\S+) shows only beside (\S+), which hides it on these records; .*",
      lambda m: f"{term_name(m[1])} zeigt sich nur neben „{term_name(m[2])}“, das es auf diesen Messungen "
      f"verdeckt; „{term_name(m[2])}“ wird nicht genannt."),
+    (r"Every record goes one way: a function of position is one of the time .*",
+     ("Jede Messung geht nur in eine Richtung: Eine Funktion des Ortes ist auch eine der Zeit seit ihrem "
+      "Beginn, und diese Messungen unterscheiden sie kaum.")),
     (r"Nothing pulls back here, and the smallest constant force adds up: .*",
      ("Hier zieht nichts zurück, und die kleinste konstante Kraft summiert sich auf: In der Simulation hat "
       "jede zurückgehaltene Messung eine eigene, mit dem Genannten und ohne es.")),
-    (r"(An?\w* .+) explains as much of what remains as any function .* left beside it, and has (.+)\.",
-     lambda m: f"{said} erklärt von dem, was bleibt, so viel wie jede Funktion von Geschwindigkeit, Last "
-     f"oder Ort; das Gesetz gilt dem, was daneben bleibt, und hat {key_of(m[2])}."
+    (r"(An?\w* .+) explains nearly all that any function .* left beside it, and has (.+)\.",
+     lambda m: f"{said} erklärt fast alles, was eine Funktion von Geschwindigkeit, Last oder Ort erklärte; "
+     f"das Gesetz gilt dem, was daneben bleibt, und hat {key_of(m[2])}."
      if (said := as_title(held_number(m[1]))) else ""),
     (r"Simulated open loop, held-out records are (\S+ .+?) off with it, (\S+) without\.",
      r"Ohne Rückführung simuliert liegen zurückgehaltene Messungen mit ihm um \1 daneben, ohne um \2."),
@@ -141,6 +148,9 @@ REASONS: Final[Patterns] = (
      lambda m: f"{key_of(m[1])} zeigte es"),
     (r"simulated open loop, the law that fits best errs no less on held-out records than no law",
      "ohne Rückführung simuliert irrt das beste Gesetz an Zurückgehaltenem nicht weniger als keines"),
+    ((r"the law that fits best stands in for the drive: with it the inertia would be (\S+) times what it is "
+      r"without"),
+     r"das beste Gesetz steht für den Antrieb: Mit ihm wäre die Trägheit das \1-fache von der ohne"),
     (r"with the law that fits best friction would give energy in the range that was gone through",
      "mit dem besten Gesetz gäbe die Reibung im durchfahrenen Bereich Energie ab"),
     (r"no term does better in block after block that it was not fitted to",

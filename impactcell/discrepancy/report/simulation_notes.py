@@ -1,7 +1,6 @@
 """What is to be said of the open-loop simulation of held-out records beside its figures."""
 
-from impactcell.campaign import Coordinate
-from impactcell.discrepancy.machine import MachineFinding, OpenLoopError, Response, drifts
+from impactcell.discrepancy.machine import MachineFinding, OpenLoopError, drifts
 
 DRIFTS = (
     "Nothing pulls back here, and the smallest constant force adds up: in the simulation each held-out "
@@ -32,9 +31,8 @@ def notes_of_simulation(finding: MachineFinding, errors: tuple[OpenLoopError, Op
     elif drifts(base):
         notes.append(DRIFTS)
     if finding.established and after > before:
-        force, position = ("N m", "rad") if base.coordinate is Coordinate.ROTATION else ("N", "m")
-        unit = force if base.response is Response.FORCE else position
         notes.append(
-            f"Simulated open loop, held-out records are {after:.3g} {unit} off with it, {before:.3g} without."
+            f"Simulated open loop, held-out records are {after:.3g} {base.unit} off with it, {before:.3g} "
+            "without."
         )
     return notes

@@ -1,0 +1,42 @@
+"""Why a law of a machine is not proposed: what it was not fitted to contradicts it, or it cannot be."""
+
+from impactcell.discrepancy.machine.base_model import Response
+from impactcell.discrepancy.machine.finding import MachineFinding, MachineLaw
+from impactcell.discrepancy.machine.model_forces import resistance
+
+GIVES_ENERGY = "with the law that fits best friction would give energy in the range that was gone through"
+"""Why no law is proposed where held-out blocks confirm one that cannot be."""
+LEAST_INERTIA = 0.3
+"""Times the inertia without a law, below which the law stands in for the drive: with all of it cancelled and
+no inertia the equation of motion is 0 = 0 [1]."""
+NEGATIVE_SHARE = 0.02
+"""Share of the largest friction by which it may be below zero before it gives energy [1]."""
+
+
+def refusal_of(finding: MachineFinding, law: MachineLaw, tests: int) -> str:
+    """Say why a law, one of so many that are tested, is not proposed; empty if it is."""
+    if not law.fall.is_real_among(tests):
+        return "on held-out blocks the gap does not fall by more than chance"
+    left = _inertia_left(law)
+    if left < LEAST_INERTIA:
+        return (
+            f"the law that fits best stands in for the drive: with it the inertia would be {left:.2g} times "
+            "what it is without"
+        )
+    if law.simulated is None:
+        return ""
+    without, with_it = law.simulated
+    if not with_it.rmse < without.rmse:
+        return "simulated open loop, the law that fits best errs no less on held-out records than no law"
+    least, largest = resistance(finding, law.model)
+    if least < -NEGATIVE_SHARE * largest:
+        return GIVES_ENERGY
+    return ""
+
+
+def _inertia_left(law: MachineLaw) -> float:
+    """Inertia with a law over that without it; 1 where the force is what is predicted."""
+    if law.model.base.response is Response.FORCE:
+        return 1.0
+    without, with_it = (1.0 + model.nuisance("inertia") for model in (law.without, law.model))
+    return with_it / without if without > 0.0 else 1.0

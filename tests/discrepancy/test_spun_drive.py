@@ -1,0 +1,121 @@
+"""A drive that is spun up by steps of its torque and never comes back, as of motors on a test bench.
+
+scipy's integrator spins it, and an encoder of 10 000 lines reads it. Friction takes nearly all of the drive.
+"""
+
+import math
+import re
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from impactcell.campaign import Campaign, Coordinate, Excitation
+from impactcell.discrepancy.machine import (
+    BaseModel,
+    MachineFinding,
+    NumberPrior,
+    TermChoice,
+    investigate_machine,
+)
+from impactcell.discrepancy.machine.look_alikes import one_way_note
+from impactcell.discrepancy.report import german_sentences
+from impactcell.records import Capture, Channel, Samples
+
+INERTIA, COULOMB, VISCOUS, ZERO = 1.2e-4, 0.012, 1.2e-4, -0.009
+"""kg m², N m, N m s/rad, and the zero of the torque [N m]."""
+STEP_S, LINE = 8e-3, 2.0 * math.pi / 1e4
+TORQUES = ((0.05, 0.06), (0.05, 0.065), (0.052, 0.062), (-0.03, -0.04), (-0.03, -0.045), (-0.032, -0.042))
+"""Before and after 10 s, of one record each [N m]."""
+
+
+def record(torques: tuple[float, float], saturating: float, seed: int) -> tuple[Channel, Channel]:
+    """20 s of it; `saturating` is a friction that speed brings up to so many newton metres."""
+    time = np.arange(0.0, 20.0, STEP_S)
+    rng = np.random.default_rng(seed)
+    warm = 1.0 + 0.02 * rng.standard_normal()
+
+    def rates(seconds: float, state: np.ndarray) -> tuple[float, float]:
+        speed = state[1]
+        friction = warm * (COULOMB * np.tanh(speed / 0.1) + VISCOUS * speed)
+        friction += saturating * np.tanh(speed / 80.0)
+        return speed, (torques[int(seconds >= 10.0)] + ZERO - friction) / INERTIA
+
+    path = solve_ivp(rates, (0.0, 20.0), (0.0, 0.0), t_eval=time, rtol=1e-8, atol=1e-8, max_step=0.05).y[0]
+    command = np.where(time < 10.0, *torques)
+    return Channel(time, command, None), Channel(time, LINE * np.round(path / LINE), None)
+
+
+@lru_cache
+def investigated(saturating: float, *, zero_is_free: bool = True) -> MachineFinding:
+    shots = [
+        Capture(number, math.nan, math.nan, *record(torques, saturating, number))
+        for number, torques in enumerate(TORQUES * 2, 1)
+    ]
+    base = BaseModel(
+        coordinate=Coordinate.ROTATION,
+        inertia=NumberPrior(INERTIA, math.inf),
+        terms=(TermChoice("coulomb_friction"), TermChoice("viscous_friction")),
+        force_offset=NumberPrior(0.0, math.inf if zero_is_free else 0.0),
+    )
+    campaign = Campaign(Excitation.DRIVEN, tuple(shots), coordinate=Coordinate.ROTATION)
+    return investigate_machine(campaign, base)
+
+
+def test_what_never_comes_back_has_blocks_enough_and_shows_its_inertia() -> None:
+    finding = investigated(0.0)
+    assert len(finding.training) > 5 * 8  # of eight records
+    assert finding.final.nuisance("inertia") == pytest.approx(0.0, abs=0.1)
+    assert finding.final.nuisance("force_offset") == pytest.approx(ZERO, rel=0.05)
+
+
+def test_a_law_that_cancels_the_drive_is_none() -> None:
+    """The same level of friction in each of the records, off by 2 %, is no function of the drive."""
+    finding = investigated(0.0)
+    assert finding.law is None
+    assert re.fullmatch(
+        r"the law that fits best stands in for the drive: with it the inertia would be \S+ times what it is "
+        r"without",
+        finding.law_refused,
+    )
+    language, said = german_sentences.reason(finding.law_refused)
+    assert language == "de"
+    assert said.startswith("das beste Gesetz steht für den Antrieb: Mit ihm wäre die Trägheit das ")
+
+
+@pytest.mark.parametrize("zero_is_free", [True, False])
+def test_friction_that_saturates_is_found_over_the_speed(zero_is_free: bool) -> None:
+    """Also where the zero of the torque is held, which is 99 % of what remains then."""
+    finding = investigated(0.02, zero_is_free=zero_is_free)
+    law = finding.law
+    assert law is not None
+    assert law.place == "law_of_friction_over_speed"
+    assert law.beside == (() if zero_is_free else ("a constant force",))
+    assert law.simulated is not None
+    without, with_it = law.simulated
+    assert with_it.rmse < 0.5 * without.rmse
+    assert any("explains nearly all that any function" in note for note in finding.notes) is not zero_is_free
+    assert law.choice is not None
+    assert law.choice.law is not None
+    speed = np.linspace(20.0, 0.95 * law.tested[1], 60)
+    sizes = [law.model.value(column) for column in law.model.terms[-1].columns]
+    parts = [item.values(speed, law.choice.law.reference) for item in law.choice.law.terms]
+    found = sum((size * part for size, part in zip(sizes, parts, strict=True)), np.zeros(60))
+    beside = np.stack([np.ones(60), speed], axis=1)  # which friction of the base model takes up
+
+    def bent(curve: Samples) -> Samples:
+        return curve - beside @ np.linalg.lstsq(beside, curve, rcond=None)[0]
+
+    truth = bent(0.02 * np.tanh(speed / 80.0))
+    assert np.sqrt(np.mean((bent(found) - truth) ** 2)) < 0.2 * np.sqrt(np.mean(truth**2))
+
+
+def test_a_function_of_position_may_be_one_of_time_where_every_record_goes_one_way() -> None:
+    records = investigated(0.0).records
+    (note,) = one_way_note(records)
+    assert german_sentences.note(note)[0] == "de"
+    there = records[0]
+    and_back = replace(there, position=there.position * (there.time_s[-1] - there.time_s))
+    assert not one_way_note([*records, and_back])
