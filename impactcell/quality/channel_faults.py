@@ -17,6 +17,10 @@ PLATEAU_FACTOR = 3.0
 everywhere."""
 MIN_STUCK = 10
 """Equal samples in a row, amid ones that differ, that are no measurement."""
+TURN_STEPS = 3.0
+"""Smallest steps within which a channel goes on after a run of equal samples where it turned or rested."""
+SMALLEST = 0.05
+"""Share of the steps from sample to sample that count as the smallest: one of the raster, rounded or not."""
 GAP_FACTOR = 5.0
 """Step of time over the median one from which on samples are missing."""
 MIN_SAMPLES = 16
@@ -85,6 +89,7 @@ def _plateaus(name: str, channel: Channel, shot: int) -> list[DataFault]:
         return data_faults
     inner = ~extreme
     stuck = inner & (lengths >= MIN_STUCK) & (lengths > PLATEAU_FACTOR * np.median(lengths) + MIN_STUCK)
+    stuck &= _goes_on_elsewhere(values[starts])
     if stuck.any() and float(np.quantile(lengths, 0.9)) < 0.5 * MIN_STUCK:
         start = int(starts[stuck][0])
         told = (
@@ -114,6 +119,15 @@ def _equal_runs(values: Samples) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Begin and length of each run of equal values."""
     starts = np.flatnonzero(np.concatenate([[True], np.diff(values) != 0.0]))
     return starts, np.diff(np.concatenate([starts, [len(values)]]))
+
+
+def _goes_on_elsewhere(levels: Samples) -> NDArray[np.bool_]:
+    """Whether a channel goes on far from where each run of equal samples stood: while stuck it went there.
+
+    At the end of a swing a fine encoder shows as long a run, and goes on by a step of its raster.
+    """
+    ahead = np.abs(np.diff(levels, append=levels[-1]))
+    return ahead > TURN_STEPS * np.quantile(ahead[:-1], SMALLEST)
 
 
 def _runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from impactcell.discrepancy.machine.base_model import Response
+from impactcell.discrepancy.machine.base_model import Response, TermChoice
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.regression import Blocks
@@ -20,6 +20,7 @@ from impactcell.discrepancy.machine.simulation import needed_force, positions_fr
 from impactcell.discrepancy.machine.ties import is_tied
 from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch, Trial
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
+from impactcell.discrepancy.machine.weak_form import Rows
 from impactcell.discrepancy.search import Proposal
 from impactcell.errors import CampaignError
 
@@ -41,6 +42,8 @@ POWER = 0.9
 """Share of the sets that have to tell the terms apart, as in the workflow of shots [1]."""
 MIN_BLOCKS = 3.0
 """Least length of a new record in blocks: with fewer none may be whole [1]."""
+LONGEST_BLOCKS = 20.0
+"""Length in blocks that is simulated of a longer record: two minutes of a swing took ten."""
 TRIED_CHANGES = 3
 """Changes, those that part the terms most first, of which sets of records are tried."""
 SIMULATION = 9
@@ -60,13 +63,25 @@ def with_experiments(fits: MachineFits, finding: MachineFinding) -> MachineFindi
     ties = [(name, rival) for name, rivals in finding.tied_with.items() for rival in rivals]
     if not ties:
         return finding
-    changes = _within_reach(finding, _changes(finding, _longest(finding)))
+    longest = _shortened(_longest(finding), LONGEST_BLOCKS * fits.block_s)
+    changes = _within_reach(finding, _changes(finding, longest))
     return replace(finding, experiments=tuple(_proposal(fits, finding, tie, changes) for tie in ties))
 
 
 def _longest(finding: MachineFinding) -> UniformRecord:
     """Record with the longest time, of equal ones that with the widest motion."""
     return max(finding.records, key=lambda record: (record.time_s[-1], np.ptp(record.position)))
+
+
+def _shortened(record: UniformRecord, most_s: float) -> UniformRecord:
+    """Take the beginning of a record: what that tells apart, all of it does."""
+    count = int(np.searchsorted(record.time_s, most_s))
+    return replace(
+        record,
+        time_s=record.time_s[:count],
+        position=record.position[:count],
+        force=record.force[:count],
+    )
 
 
 def _changes(finding: MachineFinding, record: UniformRecord) -> list[_Change]:
@@ -228,7 +243,7 @@ class _Test:
         every.gravity, every.delay_s = finding.final.gravity, finding.final.delay_s
         every.doubt = fits.doubt
         every.shapes = {name: fits.shapes[name] for name in every.shapes}
-        blocks, _ = every.blocks()
+        blocks, _ = every.blocks(_with_columns(every, terms, choices))
         if min(record.time_s[-1] for record in change.records) < MIN_BLOCKS * every.block_s:
             raise CampaignError(f"{change.words}: too short to tell anything")
         kinds = len(change.records)
@@ -265,6 +280,13 @@ class _Test:
         sets = [rng.choice(COPIES, count, replace=False).tolist() for _ in range(DRAWS)]
         pairs = [self.trials(copies) for copies in sets]
         return float(np.mean([true.gain > other.gain and not is_tied(true, other) for true, other in pairs]))
+
+
+def _with_columns(fits: MachineFits, terms: Sequence[ChosenTerm], choices: Sequence[TermChoice]) -> Rows:
+    """Rows of some terms and of some that may be missing, without those of free forms."""
+    shapes = [ChosenTerm(choice, shape) for choice in choices for shape in fits.shapes[choice.name]]
+    rows = fits.rows()
+    return replace(rows, columns={name: rows.columns[name] for name in fits.columns([*terms, *shapes])})
 
 
 def _noisy(record: UniformRecord, finding: MachineFinding, rng: np.random.Generator) -> UniformRecord:

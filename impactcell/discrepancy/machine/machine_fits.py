@@ -163,15 +163,17 @@ class MachineFits:
         }
         usual = float(np.median([*sizes.values()]))
         whole = [block for block, count in sizes.items() if count >= 0.5 * usual]
-        held = [block for block in whole if self._is_held(block, whole)]
-        return [block for block in whole if block not in set(held)], held
+        held = set(self._held_of(whole))
+        return [block for block in whole if block not in held], [block for block in whole if block in held]
 
-    def _is_held(self, block: int, whole: list[int]) -> bool:
-        record = block // BLOCKS_OF_RECORD
+    def _held_of(self, whole: Sequence[int]) -> list[int]:
+        """Which of the blocks, in their order, are held out: those of whole records, or the last of each."""
+        members: dict[int, list[int]] = {}
+        for block in whole:
+            members.setdefault(block // BLOCKS_OF_RECORD, []).append(block)
         if self.held is not None:
-            return record in self.held
-        members = [other for other in whole if other // BLOCKS_OF_RECORD == record]
-        return members.index(block) >= len(members) - len(members) // 3
+            return [block for record in members if record in self.held for block in members[record]]
+        return [block for blocks in members.values() for block in blocks[len(blocks) - len(blocks) // 3 :]]
 
     def columns(self, terms: Iterable[ChosenTerm]) -> list[Column]:
         """Columns of a model: its free nuisances and its terms."""
@@ -287,12 +289,10 @@ class MachineFits:
 
     def held_spans(self) -> tuple[tuple[int, float, float], ...]:
         """Record, begin and end of each stretch of held-out blocks."""
-        whole = [int(block) for block in np.unique(self._number(self.rows()))]
+        every = self._held_of([int(block) for block in np.unique(self._number(self.rows()))])
         spans = []
         for place, record in enumerate(self.records):
-            held = [
-                block for block in whole if block // BLOCKS_OF_RECORD == place and self._is_held(block, whole)
-            ]
+            held = [block for block in every if block // BLOCKS_OF_RECORD == place]
             if held:
                 begin = (held[0] % BLOCKS_OF_RECORD) * self.block_s if self.held is None else 0.0
                 spans.append((place, begin, float(record.time_s[-1])))

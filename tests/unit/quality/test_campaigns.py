@@ -152,6 +152,29 @@ def test_a_driven_part_that_follows_the_force_never_slides() -> None:
     assert data_fault.fault is Fault.PRESLIDING_ONLY
 
 
+def test_the_end_of_a_swing_is_no_dropout_and_a_channel_that_stood_still_is(
+    shots: tuple[Capture, ...],
+) -> None:
+    """An encoder of 14 400 lines stands for 14 samples where a pendulum turns, and its clock jitters."""
+    rng = np.random.default_rng(4)
+    time = np.arange(0.0, 40.0, 1e-3)
+    read_at = time + 1.5e-3 * (rng.uniform(size=time.size) < 0.3)
+    line = 2.0 * np.pi / 14_400
+    angle = line * np.round(0.4 * np.exp(-read_at / 80.0) * np.sin(6.0 * read_at) / line)
+    angle = np.round(angle, 6)  # as a file has it
+    swing = replace(shots[0], force=None, position=Channel(time, angle, None))
+
+    def found(shot: Capture) -> list[str]:
+        faults = inspect_campaign(Campaign(Excitation.FREE_SLIDE, (shot,)))
+        return [one.message for one in faults if one.fault is Fault.DROPOUTS]
+
+    assert not found(swing)
+    angle = angle.copy()
+    angle[20_000:20_020] = angle[20_000]  # at full speed
+    (told,) = found(replace(swing, position=Channel(time, angle, None)))
+    assert "for 20 samples from 20 s (1 such stretches)" in told
+
+
 def test_a_coarse_raster_is_no_dropout(shots: tuple[Capture, ...]) -> None:
     def coarse(shot: Capture) -> Capture:
         assert shot.force is not None
