@@ -127,7 +127,7 @@ def _goes_on_elsewhere(levels: Samples) -> NDArray[np.bool_]:
     At the end of a swing a fine encoder shows as long a run, and goes on by a step of its raster.
     """
     ahead = np.abs(np.diff(levels, append=levels[-1]))
-    return ahead > TURN_STEPS * np.quantile(ahead[:-1], SMALLEST)
+    return ahead > TURN_STEPS * float(np.quantile(ahead[:-1], SMALLEST))
 
 
 def _runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -16,6 +16,7 @@ from impactcell.discrepancy.machine.fine_sampling import finely_sampled
 from impactcell.discrepancy.machine.held_out_stretch import pulls_back
 from impactcell.discrepancy.machine.law_search import with_law
 from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.release import from_release
 from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
@@ -67,6 +68,9 @@ def investigate_machine(
             "one of them has to change its `coordinate`"
         )
     base, notes = hold_what_cannot_be_seen(base, records)
+    if base.gravity_torque.value != 0.0 and not any(record.force.any() for record in records):
+        records, said = from_release(records)
+        notes += said
     records, notes = _with_samples_enough(records, notes)
     candidates = _candidates(base, records)
     notes += _notes_of_columns_with_gaps(records)

@@ -68,6 +68,9 @@ NOTES: Final[Patterns] = (
     (r"Outliers of (\d+) shots are left out of the fits\.", r"Ausreißer werden nicht angepasst (Stöße: \1)."),
     (r"(\d+) of (\d+) samples stood far from their neighbours and were replaced\.",
      r"\1 von \2 Messwerten lagen weit von ihren Nachbarn und wurden ersetzt."),
+    (r"Shot (\d+): what lies before (\S+) s is left out, since the swing grows until then: .*",
+     (r"Messung \1: Was vor \2 s liegt, ist ausgelassen, denn bis dahin wächst die Schwingung: Etwas treibt "
+      r"sie.")),
     (r"The column '(.+)' of shots\.csv is empty in (\d+) of (\d+) shots: nothing is judged by it\.",
      r"Die Spalte '\1' von shots.csv ist in \2 von \3 Messungen leer: Nach ihr wird nichts beurteilt."),
     (r"The force is held from one update to the next in (\d+) of (\d+) records: .*",
