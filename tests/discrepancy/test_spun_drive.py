@@ -4,7 +4,6 @@ scipy's integrator spins it, and an encoder of 10 000 lines reads it. Friction t
 """
 
 import math
-import re
 from dataclasses import replace
 from functools import lru_cache
 
@@ -13,13 +12,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
+from impactcell.discrepancy.laws import FittedFunction
 from impactcell.discrepancy.machine import (
     BaseModel,
+    FallOfGap,
     MachineFinding,
+    MachineLaw,
     NumberPrior,
     TermChoice,
     investigate_machine,
 )
+from impactcell.discrepancy.machine.law_refusal import refusal_of
 from impactcell.discrepancy.machine.look_alikes import one_way_note
 from impactcell.discrepancy.report import german_sentences
 from impactcell.records import Capture, Channel, Samples
@@ -72,17 +75,32 @@ def test_what_never_comes_back_has_blocks_enough_and_shows_its_inertia() -> None
 
 
 def test_a_law_that_cancels_the_drive_is_none() -> None:
-    """The same level of friction in each of the records, off by 2 %, is no function of the drive."""
+    """The level of friction, another by 2 % in each record, is no function of the drive."""
     finding = investigated(0.0)
     assert finding.law is None
-    assert re.fullmatch(
-        r"the law that fits best stands in for the drive: with it the inertia would be \S+ times what it is "
-        r"without",
-        finding.law_refused,
+    final = finding.final
+    place = final.fit.columns.index(("inertia", 0.0, 0))
+
+    def law_with(inertia: float) -> MachineLaw:
+        """Make one whose inertia is so many times that without it."""
+        coefficients = final.fit.coefficients.copy()
+        coefficients[place] = inertia * (1.0 + coefficients[place]) - 1.0
+        model = replace(final, fit=replace(final.fit, coefficients=coefficients))
+        curve = FittedFunction(*np.zeros((4, 2)))
+        fall = FallOfGap(5.0, 1.0, 0.99, 0.9, 1.0, 1e-3)
+        name = "law_of_friction_over_load"
+        return MachineLaw(name, (0.0, 1.0), curve, None, (), (), final, model, fall, None)
+
+    assert refusal_of(finding, law_with(0.5), 1) == ""
+    refused = refusal_of(finding, law_with(0.01), 1)
+    assert refused == (
+        "the law that fits best stands in for the drive: with it the inertia would be 0.01 times what it is "
+        "without"
     )
-    language, said = german_sentences.reason(finding.law_refused)
-    assert language == "de"
-    assert said.startswith("das beste Gesetz steht für den Antrieb: Mit ihm wäre die Trägheit das ")
+    assert german_sentences.reason(refused) == (
+        "de",
+        "das beste Gesetz steht für den Antrieb: Mit ihm wäre die Trägheit das 0,01-fache von der ohne",
+    )
 
 
 @pytest.mark.parametrize("zero_is_free", [True, False])
@@ -92,6 +110,7 @@ def test_friction_that_saturates_is_found_over_the_speed(zero_is_free: bool) -> 
     law = finding.law
     assert law is not None
     assert law.place == "law_of_friction_over_speed"
+    assert "law_of_friction_over_load" not in law.rival_places
     assert law.beside == (() if zero_is_free else ("a constant force",))
     assert law.simulated is not None
     without, with_it = law.simulated

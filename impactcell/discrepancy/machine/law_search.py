@@ -56,6 +56,8 @@ PIECES_PER_WAVE = 3.0
 """Pieces of a spline that a wave takes to be seen in it."""
 MOST_FREED = 3
 """Numbers that the base model holds, and beside which a law is looked for."""
+BY_LOAD = TermChoice("load_dependent_friction")
+"""Not looked for where it looks like the drive: any law over the load can cancel that then."""
 NOTHING_HELPS = "no function of speed, load or position helps block after block that it was not fitted to"
 """Why no law is proposed where no spline holds."""
 
@@ -96,7 +98,7 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNu
         return NOTHING_HELPS
     before = out_of_fold_losses(training, columns, fits.priors, fits.nonnegative)
     tried = sorted(
-        (best_spline(fits, training, model, before, form) for form in _gone_through(finding)),
+        (best_spline(fits, training, model, before, form) for form in _gone_through(fits, finding)),
         key=lambda spline: -float(spline.gains.sum()),
     )
     looked_at = _LookedAt(fits, finding, own, training, held_out, model, before, tuple(tried))
@@ -209,10 +211,13 @@ class _LookedAt:
         )
 
 
-def _gone_through(finding: MachineFinding) -> list[str]:
-    """Free forms whose covariate has a range."""
+def _gone_through(fits: MachineFits, finding: MachineFinding) -> list[str]:
+    """Free forms whose covariate has a range; none over a load that looks like the drive itself."""
     ranges = finding.scale.ranges
-    return [form for form in FREE_FORMS if ranges[COVARIATES[form]][1] > ranges[COVARIATES[form]][0]]
+    forms = [form for form in FREE_FORMS if ranges[COVARIATES[form]][1] > ranges[COVARIATES[form]][0]]
+    looked_at = {trial.term.choice for step in finding.steps for trial in step.trials}
+    is_drive = BY_LOAD in fits.candidates and BY_LOAD not in looked_at
+    return [form for form in forms if not (is_drive and COVARIATES[form] == "load")]
 
 
 def _is_resolved(form: RankedForm, tested: tuple[float, float]) -> bool:
