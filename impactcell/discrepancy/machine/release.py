@@ -31,7 +31,7 @@ def from_release(records: Sequence[UniformRecord]) -> tuple[tuple[UniformRecord,
     for record in records:
         angle = np.abs(record.position)
         largest = int(angle.argmax())
-        first = round(_period_s(record.position[largest:], record.step_s) / record.step_s)
+        first = max(round(_period_s(record.position[largest:], record.step_s) / record.step_s), 1)
         has_grown = largest > first and float(angle[:first].max()) < GROWN * float(angle[largest])
         if not has_grown or float(angle[largest]) > math.pi:
             free.append(record)
