@@ -8,7 +8,7 @@ from types import FunctionType, ModuleType
 import pytest
 
 from impactcell.discrepancy.laws import finding as shot_laws
-from impactcell.discrepancy.machine import CATALOGUE, FREE_FORMS, investigation, law_search, selection
+from impactcell.discrepancy.machine import CATALOGUE, FREE_FORMS, investigation, law_refusal, selection
 from impactcell.discrepancy.report import (
     german_machine_sentences,
     german_sentences,
@@ -70,7 +70,7 @@ def test_every_kind_of_fault_has_a_german_name() -> None:
     ("code", "least"),
     [
         (shot_laws._refusal, 3),
-        (law_search._refusal, 3),
+        (law_refusal.refusal_of, 3),
         (selection._refusal, 3),
         (selection.select_terms, 8),
     ],
