@@ -63,25 +63,16 @@ def with_experiments(fits: MachineFits, finding: MachineFinding) -> MachineFindi
     ties = [(name, rival) for name, rivals in finding.tied_with.items() for rival in rivals]
     if not ties:
         return finding
-    longest = _shortened(_longest(finding), LONGEST_BLOCKS * fits.block_s)
-    changes = _within_reach(finding, _changes(finding, longest))
+    longest = _longest(finding)
+    # What its beginning tells apart, all of it does.
+    beginning = longest.part(0, int(np.searchsorted(longest.time_s, LONGEST_BLOCKS * fits.block_s)))
+    changes = _within_reach(finding, _changes(finding, beginning))
     return replace(finding, experiments=tuple(_proposal(fits, finding, tie, changes) for tie in ties))
 
 
 def _longest(finding: MachineFinding) -> UniformRecord:
     """Record with the longest time, of equal ones that with the widest motion."""
     return max(finding.records, key=lambda record: (record.time_s[-1], np.ptp(record.position)))
-
-
-def _shortened(record: UniformRecord, most_s: float) -> UniformRecord:
-    """Take the beginning of a record: what that tells apart, all of it does."""
-    count = int(np.searchsorted(record.time_s, most_s))
-    return replace(
-        record,
-        time_s=record.time_s[:count],
-        position=record.position[:count],
-        force=record.force[:count],
-    )
 
 
 def _changes(finding: MachineFinding, record: UniformRecord) -> list[_Change]:
@@ -136,12 +127,8 @@ def _at_pace(record: UniformRecord, factor: float) -> UniformRecord:
     if factor == UNCHANGED:
         return record
     count = math.ceil(min(factor, 1.0) * len(record.time_s))
-    return replace(
-        record,
-        time_s=record.time_s[:count] / factor,
-        position=record.position[:count],
-        force=record.force[:count],
-    )
+    part = record.part(0, count)
+    return replace(part, time_s=part.time_s / factor)
 
 
 def _with_column(record: UniformRecord, column: str, value: float) -> UniformRecord:

@@ -75,14 +75,13 @@ def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: 
     moving = [record for record in records if np.ptp(record.position) > 0.0]
     if not moving:
         raise CampaignError("no record shows any motion")
-    # Coarse speeds: over a twentieth of a record's samples at most, so that quantised positions do not count.
+    # Coarse speeds, so that quantised positions do not count.
     speeds, places = [], []
     for record in moving:
-        width = max(len(record.position) // 200, 1)
-        speeds.append((record.position[width:] - record.position[:-width]) / (width * record.step_s))
+        speeds.append(coarse_speed(record.position, 200, record.step_s))
         places.append(record.position - record.position.mean())
     speed = np.concatenate(speeds)
-    period = 2.0 * math.pi * float(np.concatenate(places).std()) / float(np.sqrt(np.mean(speed**2)))
+    period = period_of(np.concatenate(places), speed)
     position = np.concatenate([record.position for record in records])
     scale = MotionScale(
         resolving_period(moving, period, response),
@@ -93,6 +92,17 @@ def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: 
     )
     loads = [carried_load(response, record, record.force, (gravity, scale)) for record in records]
     return replace(scale, load=float(np.quantile(np.concatenate(loads), LARGEST)))
+
+
+def coarse_speed(position: Samples, parts: int, step_s: float) -> Samples:
+    """Mean speeds over one of so many parts of the samples; none of a single sample."""
+    width = max(len(position) // parts, 1)
+    return (position[width:] - position[:-width]) / (width * step_s)
+
+
+def period_of(position: Samples, speed: Samples) -> float:
+    """2 pi std(q) / rms(q'), which of a sine is its period."""
+    return 2.0 * math.pi * float(position.std()) / float(np.sqrt(np.mean(speed**2)))
 
 
 def resolving_period(records: Sequence[UniformRecord], period_s: float, response: Response) -> float:

@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from impactcell.discrepancy.machine.motion_scale import coarse_speed, period_of
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.errors import CampaignError
 from impactcell.records import Samples
@@ -31,13 +31,13 @@ def from_release(records: Sequence[UniformRecord]) -> tuple[tuple[UniformRecord,
     for record in records:
         angle = np.abs(record.position)
         largest = int(angle.argmax())
-        first = max(round(_period_s(record.position[largest:], record.step_s) / record.step_s), 1)
-        has_grown = largest > first and float(angle[:first].max()) < GROWN * float(angle[largest])
+        period = max(round(_period_s(record.position[largest:], record.step_s) / record.step_s), 1)
+        has_grown = largest > period and float(angle[:period].max()) < GROWN * float(angle[largest])
         if not has_grown or float(angle[largest]) > math.pi:
             free.append(record)
             continue
         begin_s = float(record.time_s[largest])
-        if len(angle) - largest < SHORTEST * first:
+        if len(angle) - largest < SHORTEST * period:
             raise CampaignError(
                 f"shot {record.shot}: its swing grows until {begin_s:.3g} s, so that something drives it, "
                 f"and fewer than {SHORTEST:.0f} periods are left; record what drives it, or a longer swing"
@@ -46,22 +46,11 @@ def from_release(records: Sequence[UniformRecord]) -> tuple[tuple[UniformRecord,
             f"Shot {record.shot}: what lies before {begin_s:.3g} s is left out, since the swing grows until "
             "then: something drives it."
         )
-        free.append(
-            replace(
-                record,
-                time_s=record.time_s[largest:] - record.time_s[largest],
-                position=record.position[largest:],
-                force=record.force[largest:],
-            )
-        )
+        free.append(record.part(largest))
     return tuple(free), notes
 
 
 def _period_s(position: Samples, step_s: float) -> float:
-    """2 pi std(q) / std(q'), speeds over a two thousandth of the samples; of too few samples 0."""
-    width = max(len(position) // 2000, 1)
-    if len(position) <= width:
-        return 0.0
-    speed = (position[width:] - position[:-width]) / (width * step_s)
-    size = float(np.sqrt(np.mean(speed**2)))
-    return 2.0 * math.pi * float(position.std()) / size if size > 0.0 else 0.0
+    """Period by speeds over a two thousandth of the samples; of too few samples 0."""
+    speed = coarse_speed(position, 2000, step_s)
+    return period_of(position, speed) if speed.any() else 0.0

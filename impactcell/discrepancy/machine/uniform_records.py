@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -58,6 +58,16 @@ class UniformRecord:
     def step_s(self) -> float:
         """Time from sample to sample."""
         return float(self.time_s[1] - self.time_s[0])
+
+    def part(self, first: int, last: int | None = None) -> "UniformRecord":
+        """Take the samples from `first` on, to before `last`; time begins anew."""
+        inside = slice(first, last)
+        return replace(
+            self,
+            time_s=self.time_s[inside] - self.time_s[first],
+            position=self.position[inside],
+            force=self.force[inside],
+        )
 
     @property
     def sensor_noise(self) -> tuple[float, float]:

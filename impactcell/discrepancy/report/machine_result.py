@@ -171,11 +171,10 @@ def _fall(fall: FallOfGap) -> dict[str, Any]:
 
 def _simulation(finding: MachineFinding, errors: tuple[OpenLoopError, OpenLoopError]) -> dict[str, Any]:
     channel = str(finding.base.response)
-    symbols = SYMBOLS[finding.base.coordinate]
     when = dict(zip(("before", "after"), errors, strict=True))
     return {
         "channel": channel,
-        "unit": symbols["force"] if channel == "force" else symbols["q"],
+        "unit": finding.base.unit,
         "rmse": {name: round_digits(error.rmse) for name, error in when.items()},
         "fit_percent": {name: round_digits(error.fit_percent) for name, error in when.items()},
         "relative_force_error": {name: round_digits(error.relative_force) for name, error in when.items()},
