@@ -90,6 +90,7 @@ def _plateaus(name: str, channel: Channel, shot: int) -> list[DataFault]:
     inner = ~extreme
     stuck = inner & (lengths >= MIN_STUCK) & (lengths > PLATEAU_FACTOR * np.median(lengths) + MIN_STUCK)
     stuck &= _goes_on_elsewhere(values[starts])
+    stuck[0] = False  # a command that waits for its first step; nothing was lost before the record
     if stuck.any() and float(np.quantile(lengths, 0.9)) < 0.5 * MIN_STUCK:
         start = int(starts[stuck][0])
         told = (

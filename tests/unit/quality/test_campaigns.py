@@ -175,6 +175,24 @@ def test_the_end_of_a_swing_is_no_dropout_and_a_channel_that_stood_still_is(
     assert "for 20 samples from 20 s (1 such stretches)" in told
 
 
+def test_a_command_that_waits_for_its_first_step_is_no_dropout(shots: tuple[Capture, ...]) -> None:
+    """What a controller made of a coarse encoder, a tenth of a second before the reference steps."""
+    rng = np.random.default_rng(8)
+    time = np.arange(2000) * 1e-3
+    error = np.where(time < 0.1, 0.0, np.exp(-5.0 * np.maximum(time - 0.1, 0.0)))
+    command = error + np.where(time < 0.1, 0.0, rng.normal(0.0, 1e-3, time.size))
+
+    def told(values: np.ndarray) -> list[str]:
+        waiting = replace(shots[0], force=Channel(time, values))
+        faults = inspect_campaign(campaign((waiting, *shots[1:])))
+        return [one.message for one in faults if one.fault is Fault.DROPOUTS]
+
+    assert told(command) == []
+    command[700:760] = command[700]
+    (later,) = told(command)
+    assert "for 60 samples from 0.7 s (1 such stretches)" in later
+
+
 def test_a_coarse_raster_is_no_dropout(shots: tuple[Capture, ...]) -> None:
     def coarse(shot: Capture) -> Capture:
         assert shot.force is not None
