@@ -24,7 +24,8 @@ def import_files(
     gain: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="QUANTITY=GAIN", help="What a signal in volts stands for: force=12.5 N/V, or 80 mV/N."
+            metavar="QUANTITY=GAIN",
+            help="What a signal in volts stands for: force=12.5 N/V, or 80 mV/N; position=20 mm/rev.",
         ),
     ] = None,
     sign: Annotated[list[str] | None, typer.Option(metavar="QUANTITY=+1|-1", help="Turn a channel.")] = None,

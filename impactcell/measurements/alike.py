@@ -57,9 +57,9 @@ def left_empty(tables: Sequence[Table], records: Sequence[Record], mapping: Mapp
     """Tell what some files have no column of, and which records say no mass where others do."""
     notes = []
     for item in mapping.assignments:
-        files = {table.source: False for table in tables}
+        files = {table.recorded_in: False for table in tables}
         for table in tables:
-            files[table.source] |= table.column(item.column) is not None
+            files[table.recorded_in] |= table.column(item.column) is not None
         without = [file for file, has_it in files.items() if not has_it]
         if item.meaning in MAY_LACK and without:
             notes.append(
@@ -83,10 +83,10 @@ def _lacking(tables: Sequence[Table], mapping: Mapping, meaning: ColumnMeaning) 
     said: dict[str, str] = {}
     for table in tables:
         if item is not None and table.column(item.column) is not None:
-            said[table.source] = f"has as column {item.column!r}"
+            said[table.recorded_in] = f"has as column {item.column!r}"
         elif meaning in said_beside(table):
-            said.setdefault(table.source, "says beside its columns")
-    for file in dict.fromkeys(table.source for table in tables if said):
+            said.setdefault(table.recorded_in, "says beside its columns")
+    for file in dict.fromkeys(table.recorded_in for table in tables if said):
         if file not in said:
             other, how = next(iter(said.items()))
             yield f"{file}: has no {meaning}, which {other} {how}; {_way_out(meaning, how, mapping)}"

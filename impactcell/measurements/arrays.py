@@ -1,6 +1,7 @@
 """Arrays of a binary file as columns of a table."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,13 +29,14 @@ def column_of(
     short = None if unit is None or not str(unit).strip() else str(unit).strip()
     if short is None:
         name, short = split_unit(name)
+    begun = None
     if array.dtype.kind == "M":
         told = array[~np.isnat(array)]
-        first = told[0] if told.size else array[0]
-        array = array - (first if origin is None else origin)
+        begun = origin if origin is not None else told[0] if told.size else array[0]
+        array = array - begun
     if array.dtype.kind == "m":
         seconds = array / np.timedelta64(1, "ns") * 1e-9
-        return MeasuredColumn(name, "s", np.asarray(seconds, dtype=np.float64))
+        return MeasuredColumn(name, "s", np.asarray(seconds, dtype=np.float64), begun=begun)
     if array.dtype.kind in "biuf":
         return MeasuredColumn(name, short, np.ascontiguousarray(array, dtype=np.float64))
     if array.dtype.kind in "OSUc":
@@ -54,24 +56,24 @@ def tables_of(
     attributes: Mapping[str, object] | None = None,
     note: str = "",
     origin: np.datetime64 | None = None,
+    begun: np.datetime64 | None = None,
 ) -> list[Table]:
     """Give the tables of named arrays: those of one length share one, in order of appearance.
 
-    Moments count from `origin`, where there is one.
+    Moments count from `origin`, where there is one; the seconds of the first array from `begun`.
     """
     by_length: dict[int, list[MeasuredColumn]] = {}
-    for name, unit, values in columns:
+    for place, (name, unit, values) in enumerate(columns):
         column = column_of(name, unit, values, origin)
         if column is not None:
+            if place == 0 and begun is not None:
+                column = replace(column, begun=begun)
             by_length.setdefault(len(column.values), []).append(column)
     said = {str(key): _word(value)[:MAX_TEXT] for key, value in (attributes or {}).items()}
     tables = []
     for same in by_length.values():
         names = unique_names([column.name for column in same])
-        renamed = tuple(
-            MeasuredColumn(name, column.unit, column.values, column.text)
-            for name, column in zip(names, same, strict=True)
-        )
+        renamed = tuple(replace(column, name=name) for name, column in zip(names, same, strict=True))
         tables.append(Table(source, renamed, group, said, (note,) if note else ()))
     return tables
 

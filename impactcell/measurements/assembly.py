@@ -14,9 +14,11 @@ from impactcell.measurements.alike import check_channels_alike, check_scalars_al
 from impactcell.measurements.captures import channel_of, described
 from impactcell.measurements.excitation import SWAPPED, excitation_of, looks_swapped
 from impactcell.measurements.faults import raise_faults
-from impactcell.measurements.mapping import Given, Mapping
-from impactcell.measurements.measured_records import Record, records_of
+from impactcell.measurements.given_values import Given
+from impactcell.measurements.mapping import Mapping
+from impactcell.measurements.measured_records import Record
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
+from impactcell.measurements.recorders import of_one_recording, records_of
 from impactcell.measurements.scalars import said_beside
 from impactcell.measurements.table import Table
 from impactcell.measurements.taps import taps_of
@@ -56,9 +58,10 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     if mapping.faults:
         raise MeasurementError("\n".join(mapping.faults))
     given = mapping.given
-    records = records_of(tables, mapping)
+    tables = of_one_recording(tables, mapping)
+    records, notes_of_recorders = records_of(tables, mapping)
     check_channels_alike(records, mapping)
-    notes = _said_of(tables, given)
+    notes = [*notes_of_recorders, *_said_of(tables, given)]
     excitation = given.excitation or excitation_of(records, notes)
     _check_channels(records, mapping, excitation)
     notes += _of_sums(mapping, excitation)
@@ -214,7 +217,8 @@ def _coordinate(mapping: Mapping, excitation: Excitation) -> Coordinate:
     if rotating != set(dimensions):
         told = ", ".join(f"{name} in {dimension.value}" for name, dimension in dimensions.items())
         raise MeasurementError(
-            f"{told}: some are of a rotation and some of a translation; give units that fit"
+            f"{told}: some are of a rotation and some of a translation; give units that fit, or what a turn "
+            f"moves, as --gain 'position=20 mm/rev'"
         )
     if excitation is Excitation.TAP:
         raise MeasurementError("a tap goes along a line; say --excitation driven for what rotates")

@@ -2,7 +2,7 @@
 
 import math
 
-from impactcell.measurements.mapping import Given
+from impactcell.measurements.given_values import Given
 from impactcell.measurements.measured_records import Record
 from impactcell.measurements.recognition import ColumnMeaning
 from impactcell.records import Capture, Channel

@@ -2,6 +2,7 @@
 
 import codecs
 import csv
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +15,8 @@ DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "whi
 DECIMALS = (".", ",")
 SAMPLED_LINES = 200
 """Lines in the later part of a file from which its dialect is told: enough for any mixture of cells."""
+_ONE_OR_TWO = re.compile(r"\s*[+-]?\d+,\d+\s*")
+"""A row that is one number with a decimal comma, or two whole ones."""
 _BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8-sig"),
     (codecs.BOM_UTF32_LE, "utf-32"),
@@ -121,14 +124,18 @@ def detect(lines: Sequence[str], given: Dialect) -> tuple[str, str, str]:
     """Delimiter, decimal mark, and why, from lines of which most are rows of numbers.
 
     The pair wins under which most lines have equally many cells and most cells are numbers; then the one with
-    more columns, with fewer numbers that need a separator of thousands, and the likelier delimiter.
+    more columns, with fewer numbers that need a separator of thousands, and the likelier delimiter. A column
+    of its own with decimal commas looks like two of whole numbers, but for its one name.
 
     Raises
     ------
     MeasurementError
         The given delimiter is the decimal mark, too.
     """
-    sample = later_lines([line for line in lines if line.strip()])
+    filled = [line for line in lines if line.strip()]
+    sample = later_lines(filled)
+    if given.delimiter is None and given.decimal is None and _is_one_column(filled):
+        return ";", ",", "one column, decimal comma"
     delimiters = DELIMITERS if given.delimiter is None else {given.delimiter: given.delimiter}
     decimals = DECIMALS if given.decimal is None else (given.decimal,)
     quoted = any('"' in line for line in sample)
@@ -151,6 +158,15 @@ def detect(lines: Sequence[str], given: Dialect) -> tuple[str, str, str]:
     elif given.decimal is None and columns and (example := _ambiguous_number(sample, delimiter, decimal)):
         note += f" (numbers like {example!r} could be thousands: --decimal says)"
     return delimiter, decimal, note
+
+
+def _is_one_column(filled: Sequence[str]) -> bool:
+    """Whether `12,5` in each row is one number and not two: the line above the first such row is no pair."""
+    begin = next((row for row, line in enumerate(filled) if _ONE_OR_TWO.fullmatch(line)), 0)
+    if not begin or not all(map(_ONE_OR_TWO.fullmatch, later_lines(filled[begin:]))):
+        return False
+    above = filled[begin - 1]
+    return "," not in above and any(map(str.isalpha, above))
 
 
 def _score(rows: list[list[str]], decimal: str) -> tuple[float, int, int]:

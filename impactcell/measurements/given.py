@@ -8,7 +8,7 @@ from pathlib import Path
 from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError, SettingsError
 from impactcell.measurements.gains import Gain, parse_gain
-from impactcell.measurements.mapping import Given
+from impactcell.measurements.given_values import Given
 from impactcell.measurements.numbers import parse_number
 from impactcell.measurements.recognition import CHANNELS, VOCABULARY, ColumnMeaning
 from impactcell.measurements.taps import NO_TRIGGER
@@ -183,6 +183,7 @@ def _gain(quantity: ColumnMeaning, text: str, faults: list[str]) -> Gain | None:
         faults.append(
             f"the gain of {quantity} is {text!r}; write it with its units, as {quantity}=12.5 {unit}/V or "
             f"{quantity}=80 mV/{unit}, or {quantity}=0.01 {unit} for one count of a converter"
+            f"{'' if quantity is ColumnMeaning.FORCE else f', or {quantity}=20 mm/rev of a spindle'}"
         )
     return gain
 

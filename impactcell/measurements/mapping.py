@@ -1,11 +1,9 @@
 """What each column of a table means: guessed, with the reason and how sure, or given."""
 
-from collections.abc import Mapping as AbstractMapping
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, replace
 
-from impactcell.campaign import Excitation
-from impactcell.errors import MeasurementError
 from impactcell.measurements.assignment import SURE, Assignment, ascends, changes_within, counts_rows, lacking
 from impactcell.measurements.column_units import (
     contrary_units,
@@ -14,7 +12,7 @@ from impactcell.measurements.column_units import (
     unit_of,
     without_unit,
 )
-from impactcell.measurements.gains import Gain
+from impactcell.measurements.given_values import Given, check_given, unused_gains, without_use
 from impactcell.measurements.recognition import (
     SPEED_OF,
     UNIT_ALONE,
@@ -25,7 +23,7 @@ from impactcell.measurements.recognition import (
 )
 from impactcell.measurements.table import MeasuredColumn, Table
 from impactcell.measurements.text_channels import text_channels
-from impactcell.measurements.units import Dimension, MeasuredUnit, parse_unit
+from impactcell.measurements.units import Dimension, MeasuredUnit
 
 GIVEN = 1.0
 """Confidence of what was given."""
@@ -38,44 +36,8 @@ PRIORITY = (
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
-    """What the user says instead of letting it be guessed; empty where he says nothing.
-
-    Attributes
-    ----------
-    columns : mapping
-        MeasuredColumn of a quantity, as `force`: `Kraft 1`.
-    units : mapping
-        MeasuredUnit of a column by its name.
-    signs : mapping
-        +1 or -1 for a channel, as `force`: -1.
-    excitation : Excitation or None
-    trigger : float or str or None
-        Threshold of the force [N] at which contact begins; `none` where t = 0 is the contact already.
-    constants : mapping
-        Mass, velocity, direction, stroke, rate and gravity of all shots, in SI units, by their names.
-    others : mapping
-        Columns that are covariates or ignored, by their names.
-    gains : mapping
-        What the signal in the column of a channel stands for.
-    delays : mapping
-        How much later than it happened a channel was recorded [s].
-    """
-
-    columns: AbstractMapping[ColumnMeaning, str] = field(default_factory=dict)
-    units: AbstractMapping[str, str] = field(default_factory=dict)
-    signs: AbstractMapping[ColumnMeaning, int] = field(default_factory=dict)
-    excitation: Excitation | None = None
-    trigger: float | str | None = None
-    constants: AbstractMapping[str, float] = field(default_factory=dict)
-    others: AbstractMapping[str, ColumnMeaning] = field(default_factory=dict)
-    gains: AbstractMapping[ColumnMeaning, Gain] = field(default_factory=dict)
-    delays: AbstractMapping[ColumnMeaning, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, slots=True)
 class Mapping:
-    """What the columns of tables with the same columns mean.
+    """What the columns of tables mean.
 
     Attributes
     ----------
@@ -94,11 +56,23 @@ class Mapping:
         """Give the column of a quantity that only one can have."""
         return next((item for item in self.assignments if item.meaning is meaning), None)
 
+    def time_of(self, table: Table) -> Assignment | None:
+        """Give the column of time of a table: what was recorded apart may call it otherwise."""
+        return next(
+            (
+                item
+                for item in self.assignments
+                if item.meaning is ColumnMeaning.TIME and table.column(item.column) is not None
+            ),
+            None,
+        )
+
 
 def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
     """Say what each column of the tables means.
 
-    Columns that several tables share are one; of a quantity that only one can have, the surest gets it.
+    Columns that several tables share are one; of a quantity that only one can have, the surest gets it. Only
+    of time each table may have its own.
 
     Raises
     ------
@@ -110,17 +84,21 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
     for table in tables:
         for column in table.columns:
             columns.setdefault(column.name, column)
-    _check_given(columns, given)
+    check_given(columns, given)
+    beside = _beside(tables)
     candidates = [
         candidate
         for column in columns.values()
-        for candidate in _candidates(column, given, list(columns.values()))
+        for candidate in _candidates(column, given, list(columns.values()), beside[column.name])
     ]
     candidates.sort(key=lambda item: (-item.confidence, PRIORITY.index(item.meaning)))
     chosen: dict[str, Assignment] = {}
     quantities: dict[ColumnMeaning, Assignment] = {}
     for item in candidates:
         taken = quantities.get(item.meaning)
+        if item.meaning is ColumnMeaning.TIME and taken is not None:
+            of_time = [one for one in chosen.values() if one.meaning is ColumnMeaning.TIME]
+            taken = next((one for one in of_time if one.column in beside[item.column]), None)
         if taken is not None and taken.confidence < GIVEN and abs(taken.confidence - item.confidence) < 0.05:
             unsure = replace(
                 taken,
@@ -137,76 +115,26 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
     texts = text_channels(assignments, tables)
     faults = [fault for _, fault in texts.values()]
     faults += lacking(assignments, given.constants, tables, {meaning for meaning, _ in texts.values()})
-    faults += [*_without_use(assignments, given, tables), *_unused_gains(assignments, given, columns)]
+    faults += [*without_use(assignments, given, tables), *unused_gains(assignments, given, columns)]
     faults += without_unit(tables, assignments, given.units, given.gains)
     faults += covariates_without_unit(tables, assignments, given.units)
     faults += contrary_units(tables, given.units)
     return Mapping(assignments, given, tuple(faults))
 
 
-def _without_use(assignments: Sequence[Assignment], given: Given, tables: Sequence[Table]) -> list[str]:
-    """Tell what was given and would change nothing: who gave it believes that it counts."""
-    columns = {item.meaning: item.column for item in assignments}
-    faults = [
-        f"a {what} of the {meaning} was given, and no column is the {meaning}; name it with --column "
-        f"{meaning}=NAME, or take the {what} away"
-        for what, said in (("sign", given.signs), ("delay", given.delays))
-        for meaning in said
-        if meaning not in columns
-    ]
-    time = columns.get(ColumnMeaning.TIME)
-    if time is not None and "rate_hz" in given.constants and all(table.column(time) for table in tables):
-        faults.append(
-            f"the times are those of column {time!r}, so that the rate has no use; take the rate away, or "
-            f"say --column 'ignored={time}' for it to count"
-        )
-    return faults
+def _beside(tables: Sequence[Table]) -> dict[str, set[str]]:
+    """Names of the columns that stand in one table with each, its own among them."""
+    beside: dict[str, set[str]] = {}
+    for table in tables:
+        names = {column.name for column in table.columns}
+        for name in names:
+            beside.setdefault(name, set()).update(names)
+    return beside
 
 
-def _unused_gains(
-    assignments: Sequence[Assignment], given: Given, columns: AbstractMapping[str, MeasuredColumn]
-) -> list[str]:
-    """Tell gains of what is no column, or of one that is in no unit of their signal."""
-    names = {item.meaning: item.column for item in assignments}
-    faults = []
-    for meaning, gain in given.gains.items():
-        name = names.get(meaning)
-        if name is None:
-            faults.append(
-                f"a gain of the {meaning} was given, and no column is the {meaning}; name it with --column "
-                f"{meaning}=NAME, or take the gain away"
-            )
-        elif (unit := unit_of(columns[name], given.units)) and gain.measured(unit) is None:
-            faults.append(
-                f"column {name!r} ({meaning}) is in {unit.symbol}, of which a gain of {gain.text} says "
-                f"nothing; take it away, or say --unit '{name}={gain.signal.symbol}'"
-            )
-    return faults
-
-
-def _check_given(columns: AbstractMapping[str, MeasuredColumn], given: Given) -> None:
-    known = ", ".join(repr(name) for name in columns)
-    faults = [
-        f"there is no column {name!r}; the columns are {known}"
-        for name in (*given.columns.values(), *given.units, *given.others)
-        if name not in columns
-    ]
-    faults += [
-        f"the unit {unit!r} of {name!r} is not known; write it as mm, N, mm/min or deg, say"
-        for name, unit in given.units.items()
-        if parse_unit(unit) is None
-    ]
-    meanings = [(name, str(meaning)) for meaning, name in given.columns.items()]
-    meanings += [(name, str(meaning)) for name, meaning in given.others.items()]
-    for name in dict.fromkeys(name for name, _ in meanings):
-        several = [meaning for of, meaning in meanings if of == name]
-        if len(several) > 1:
-            faults.append(f"column {name!r} is given as {' and as '.join(several)}; it is one of them")
-    if faults:
-        raise MeasurementError("\n".join(faults))
-
-
-def _candidates(column: MeasuredColumn, given: Given, columns: Sequence[MeasuredColumn]) -> list[Assignment]:
+def _candidates(
+    column: MeasuredColumn, given: Given, columns: Sequence[MeasuredColumn], beside: AbstractSet[str]
+) -> list[Assignment]:
     """Whatever a column could be, with how sure it is."""
     unit = unit_of(column, given.units)
     if column.name in given.others:
@@ -216,7 +144,8 @@ def _candidates(column: MeasuredColumn, given: Given, columns: Sequence[Measured
         return [Assignment(column.name, named[0], measured_unit(unit, named[0], given.gains), GIVEN, "given")]
     found = []
     for meaning in PRIORITY:
-        if meaning in given.columns:
+        said = given.columns.get(meaning)
+        if said is not None and (said in beside or meaning is not ColumnMeaning.TIME):
             continue
         measured = measured_unit(unit, meaning, given.gains)
         score, why = _score(column, meaning, measured, columns, given)
@@ -275,7 +204,9 @@ def _further(column: MeasuredColumn, given: Given, speed: Dimension | None) -> A
     if column.name in given.others:
         return Assignment(column.name, given.others[column.name], unit, GIVEN, "given")
     if column.text is None and len(column.values) > 2 and counts_rows(column.values):
-        return Assignment(column.name, ColumnMeaning.IGNORED, unit, UNIT_MATCH + SURE, "counts the rows")
+        is_count = float(column.values[1] - column.values[0]).is_integer()
+        why = "counts the rows" if is_count else "goes by equal steps, as a time does"
+        return Assignment(column.name, ColumnMeaning.IGNORED, unit, UNIT_MATCH + SURE, why)
     if unit is not None and unit.dimension is speed and changes_within(column.values):
         return Assignment(column.name, ColumnMeaning.IGNORED, unit, SURE, "a speed, as the position has it")
     return Assignment(column.name, ColumnMeaning.COVARIATE, unit, SURE, "none of the known quantities")

@@ -86,7 +86,14 @@ def _group(file: Any, number: int, group: Any, path: Path) -> list[Table]:
             left_out.append(f", {channel.name}: {np.count_nonzero(invalid)} samples flagged invalid left out")
         columns.append((channel.name, signal.unit or None, samples))
     name = getattr(group.channel_group, "acq_name", "") or f"group {number}"
-    return tables_of(str(path), columns, name, note=f"MDF {name}{''.join(left_out)}")
+    note = f"MDF {name}{''.join(left_out)}"
+    return tables_of(str(path), columns, name, note=note, begun=_start_of(file))
+
+
+def _start_of(file: Any) -> np.datetime64 | None:
+    """Moment of which the times of a file count, None where it says none."""
+    nanoseconds = int(getattr(file.header, "abs_time", 0))
+    return np.datetime64(nanoseconds, "ns") if nanoseconds else None
 
 
 def _without(samples: Any, invalid: Any) -> Any:

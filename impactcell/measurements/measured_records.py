@@ -30,16 +30,22 @@ class Record:
         Of each channel, shape (n,), s and SI units; only samples that are there.
     scalars : mapping
         Quantities and covariates that are constant, SI units or text.
+    shot : str
+        Number of the shot, as a column says it; empty where none does.
+    begun : datetime64 or None
+        Moment from which the times count, where the file says it.
     """
 
     place: str
     times: AbstractMapping[ColumnMeaning, Samples]
     values: AbstractMapping[ColumnMeaning, Samples]
     scalars: AbstractMapping[str, float | str] = field(default_factory=dict)
+    shot: str = ""
+    begun: np.datetime64 | None = None
 
 
-def records_of(tables: Sequence[Table], mapping: Mapping) -> list[Record]:
-    """Give the records of tables: one a shot where there is a column of shots, else one a table.
+def records_by_file(tables: Sequence[Table], mapping: Mapping) -> dict[str, list[Record]]:
+    """Give the records of each file: one a shot where there is a column of shots, else one a table.
 
     Tables of one file whose channels differ belong to one record; those with the same channels are several.
 
@@ -51,46 +57,52 @@ def records_of(tables: Sequence[Table], mapping: Mapping) -> list[Record]:
     """
     faults = _contrary_clocks(tables, mapping)
     raise_faults(faults)
-    records: list[tuple[str, Record]] = []
+    by_file: dict[str, list[Record]] = {}
     for table in tables:
-        for part, place in _parts(table, mapping, faults):
-            record = _record(part, place, mapping, faults)
+        records = by_file.setdefault(table.source, [])
+        for part, place, shot in _parts(table, mapping, faults):
+            record = _record(part, place, shot, mapping, faults)
             if record is None:
                 continue
-            before = records[-1] if records else None
-            if before and before[0] == table.source and not set(before[1].values) & set(record.values):
-                records[-1] = (table.source, _together(before[1], record))
+            if records and not set(records[-1].values) & set(record.values):
+                records[-1] = _together(records[-1], record)
             elif record.values:
-                records.append((table.source, record))
+                records.append(record)
     raise_faults(faults)
-    if not records:
+    if not any(by_file.values()):
         raise MeasurementError("no table holds a channel")
-    return [record for _, record in records]
+    return by_file
 
 
 def _contrary_clocks(tables: Sequence[Table], mapping: Mapping) -> list[str]:
     """Tell tables that a given rate would count for beside one of the same file with times of its own."""
-    time = mapping.of(ColumnMeaning.TIME)
-    if time is None or "rate_hz" not in mapping.given.constants:
+    if "rate_hz" not in mapping.given.constants:
         return []
     channels = {item.column for item in mapping.assignments if item.meaning in CHANNELS}
     measured = [table for table in tables if any(column.name in channels for column in table.columns)]
-    timed = {table.source: table for table in measured if table.column(time.column) is not None}
-    return [
-        f"{table.title}: has no column of time, where {timed[table.source].title} has {time.column!r}, and "
-        f"the rate does not say how the two stand to each other; export both with their times, or say "
-        f"--column 'ignored={time.column}' for the rate to count for both"
+    timed = {
+        table.source: (table, item.column)
         for table in measured
-        if table.source in timed and table.column(time.column) is None
-    ]
+        if (item := mapping.time_of(table)) is not None
+    }
+    faults = []
+    for table in measured:
+        if table.source in timed and mapping.time_of(table) is None:
+            other, column = timed[table.source]
+            faults.append(
+                f"{table.title}: has no column of time, where {other.title} has {column!r}, and the rate "
+                f"does not say how the two stand to each other; export both with their times, or say "
+                f"--column 'ignored={column}' for the rate to count for both"
+            )
+    return faults
 
 
-def _parts(table: Table, mapping: Mapping, faults: list[str]) -> list[tuple[Table, str]]:
-    """Rows of each shot, in order of appearance."""
+def _parts(table: Table, mapping: Mapping, faults: list[str]) -> list[tuple[Table, str, str]]:
+    """Rows of each shot, where they are found and its number, in order of appearance."""
     shot = mapping.of(ColumnMeaning.SHOT)
     column = None if shot is None else table.column(shot.column)
     if column is None:
-        return [(table, table.title)]
+        return [(table, table.title, "")]
     keys = np.array(column.text) if column.text is not None else column.values
     if column.text is None and np.isnan(keys).any():
         row = int(np.flatnonzero(np.isnan(keys))[0])
@@ -108,12 +120,9 @@ def _parts(table: Table, mapping: Mapping, faults: list[str]) -> list[tuple[Tabl
     parts = []
     for key in distinct[np.argsort(first)]:
         rows = np.flatnonzero(keys == key)
-        parts.append(
-            (
-                _rows(table, rows),
-                f"{table.title}: {column.name} {key:g}" if column.text is None else f"{table.title}: {key}",
-            )
-        )
+        number = f"{key:g}" if column.text is None else str(key)
+        place = f"{column.name} {number}" if column.text is None else number
+        parts.append((_rows(table, rows), f"{table.title}: {place}", number))
     return parts
 
 
@@ -125,10 +134,12 @@ def _rows(table: Table, rows: Lines) -> Table:
     return replace(table, columns=columns, lines=None if table.lines is None else table.lines[rows])
 
 
-def _record(table: Table, place: str, mapping: Mapping, faults: list[str]) -> Record | None:
+def _record(table: Table, place: str, shot: str, mapping: Mapping, faults: list[str]) -> Record | None:
     time = _time(table, mapping, faults)
     if time is None:
         return None
+    of_time = mapping.time_of(table)
+    clock = None if of_time is None else table.column(of_time.column)
     times: dict[ColumnMeaning, Samples] = {}
     values: dict[ColumnMeaning, Samples] = {}
     for meaning in CHANNELS:
@@ -151,7 +162,8 @@ def _record(table: Table, place: str, mapping: Mapping, faults: list[str]) -> Re
             times[meaning] = time[present] - mapping.given.delays.get(meaning, 0.0)
             measured = item.unit.factor * mapping.given.signs.get(meaning, 1) * column.values[present]
             values[meaning] = _summed_up(times[meaning], measured) if item.summed_up else measured
-    return Record(place, times, values, scalars_of(table, place, mapping, faults))
+    scalars = scalars_of(table, place, mapping, faults)
+    return Record(place, times, values, scalars, shot, None if clock is None else clock.begun)
 
 
 def _summed_up(time_s: Samples, speed: Samples) -> Samples:
@@ -160,7 +172,7 @@ def _summed_up(time_s: Samples, speed: Samples) -> Samples:
 
 
 def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:
-    item = mapping.of(ColumnMeaning.TIME)
+    item = mapping.time_of(table)
     column = None if item is None else table.column(item.column)
     if item is None or column is None:
         step = sampling_step_s(table, mapping.given.constants)
@@ -201,4 +213,6 @@ def _together(first: Record, second: Record) -> Record:
         {**first.times, **second.times},
         {**first.values, **second.values},
         {**first.scalars, **second.scalars},
+        first.shot,
+        first.begun,
     )

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import date
 
 import numpy as np
@@ -11,6 +12,8 @@ from impactcell.records import Samples
 
 DAY_S = 86_400.0
 """Seconds of a day."""
+EPOCH = np.datetime64("1970-01-01", "ns")
+"""Day of a time that is written without one."""
 _CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2}(?:[.,]\d+)?))?(?:\s*(?P<half>[AaPp])[Mm])?"
 _BEFORE_CLOCK, _ZONE = r",?[T ]+", r"(?:Z|[+-]\d{2}:?\d{2})?"
 _TWO = r"(\d{1,2})"
@@ -23,13 +26,29 @@ _DATES = (
 """Writings of a date, and the orders in which year, month and day may stand in each."""
 
 
-def read_moments(cells: Sequence[str]) -> Samples | None:
-    """Give the seconds from the first of a column of dates or clock times; None where it is none.
+@dataclass(frozen=True, slots=True, eq=False)
+class Moments:
+    """A column of dates or clock times.
+
+    Attributes
+    ----------
+    seconds : ndarray, shape (n,)
+        From the first.
+    begun : datetime64
+        The first; of 1 January 1970 where no day is written.
+    """
+
+    seconds: Samples
+    begun: np.datetime64
+
+
+def read_moments(cells: Sequence[str]) -> Moments | None:
+    """Give the moments of a column of dates or clock times; None where it is none.
 
     A date with dots begins with its day. One with strokes is read where one order alone fits all cells, as a
     day above 12 has it, or where all orders say the same, as within one day.
 
-    >>> read_moments(["31/01/2024 23:59:59", "01/02/2024 00:00:01"])
+    >>> read_moments(["31/01/2024 23:59:59", "01/02/2024 00:00:01"]).seconds
     array([0., 2.])
     >>> read_moments(["05/01/2024 23:59:59", "06/01/2024 00:00:01"]) is None
     True
@@ -51,28 +70,36 @@ def unread_moments(cells: Sequence[str]) -> tuple[str, str]:
     return "", ""
 
 
-def _readings(cells: Sequence[str]) -> list[Samples]:
+def _readings(cells: Sequence[str]) -> list[Moments]:
     """Give each reading of a column under which all of its cells are moments; those that agree once."""
     if not cells:
         return []
     clock = _matches(_CLOCK, cells)
     if clock:
         seconds = np.array([_second_of_day(match) for match in clock])
-        return [np.round(seconds - seconds[0], 9)]
+        return [_moments(0.0, seconds)]
     for pattern, orders in _DATES:
         matches = _matches(pattern + _BEFORE_CLOCK + _CLOCK + _ZONE, cells)
         if not matches:
             continue
         seconds = np.array([_second_of_day(match) for match in matches])
-        readings: list[Samples] = []
+        readings: list[Moments] = []
         for order in orders:
             days = {text: _ordinal(order, text) for text in {match["date"] for match in matches}}
             passed = np.array([days[match["date"]] for match in matches])
-            reading = np.round(DAY_S * (passed - passed[0]) + (seconds - seconds[0]), 9)
-            if np.isfinite(reading).all() and not any(np.array_equal(reading, one) for one in readings):
+            if not np.isfinite(passed).all():
+                continue
+            reading = _moments(passed[0], DAY_S * (passed - passed[0]) + seconds)
+            if not any(np.array_equal(reading.seconds, one.seconds) for one in readings):
                 readings.append(reading)
         return readings
     return []
+
+
+def _moments(day: float, seconds: Samples) -> Moments:
+    """Give moments by the first's day, counted from 1970, and seconds from that day's begin."""
+    since = np.timedelta64(round(1e9 * seconds[0]), "ns") + np.timedelta64(int(day), "D")
+    return Moments(np.round(seconds - seconds[0], 9), EPOCH + since)
 
 
 def _matches(pattern: str, cells: Sequence[str]) -> list[re.Match[str]]:
@@ -88,10 +115,13 @@ def _matches(pattern: str, cells: Sequence[str]) -> list[re.Match[str]]:
 
 
 def _ordinal(order: str, text: str) -> float:
-    """Give the number of a day; nan where there is no such day."""
+    """Give the number of a day, counted from 1970; nan where there is no such day."""
     of = {name: int(part) for name, part in zip(order, re.split(r"[-/.]", text), strict=True)}
     try:
-        return float(date(of["y"] if of["y"] > 99 else 2000 + of["y"], of["m"], of["d"]).toordinal())
+        return float(
+            date(of["y"] if of["y"] > 99 else 2000 + of["y"], of["m"], of["d"]).toordinal()
+            - date(1970, 1, 1).toordinal()
+        )
     except ValueError:
         return np.nan
 

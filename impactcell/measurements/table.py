@@ -26,12 +26,15 @@ class MeasuredColumn:
         In that unit; nan where there is no number.
     text : tuple of str or None
         The cells, where they are not numbers.
+    begun : datetime64 or None
+        Moment from which its seconds count, where the file says it; a time of day alone is of 1 January 1970.
     """
 
     name: str
     unit: str | None
     values: Samples
     text: tuple[str, ...] | None = None
+    begun: np.datetime64 | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +56,8 @@ class Table:
         Line of each row, counted from 1; None where the file has no lines.
     decimal : str
         Decimal mark of numbers that the file writes as text.
+    recording : str
+        What its channels were recorded together with, where that is more than its file.
     """
 
     source: str
@@ -62,6 +67,12 @@ class Table:
     notes: tuple[str, ...] = ()
     lines: Lines | None = None
     decimal: str = "."
+    recording: str = ""
+
+    @property
+    def recorded_in(self) -> str:
+        """File, or files, whose channels were recorded together."""
+        return self.recording or self.source
 
     @property
     def title(self) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from impactcell.campaign import contacts
 from impactcell.measurements.captures import channel_of, described, scalar
 from impactcell.measurements.faults import raise_faults
-from impactcell.measurements.mapping import Given
+from impactcell.measurements.given_values import Given
 from impactcell.measurements.measured_records import Record
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.numerics.spikes import noise_of

@@ -40,7 +40,8 @@ def read_tdms(path: Path, limits: Limits) -> tuple[Table, ...]:
             note = f"TDMS group {group.name}{cut}"
             for time, same in by_clock(group.channels(), origin):
                 columns = [*time, *((channel.name, _unit(channel), channel[:]) for channel in same)]
-                tables += tables_of(str(path), columns, group.name, said, note, origin)
+                begun = origin if time else None
+                tables += tables_of(str(path), columns, group.name, said, note, origin, begun)
     if not tables:
         raise MeasurementError(f"{path}: holds no channel")
     return tuple(tables)

@@ -238,5 +238,5 @@ def _kept(layout: Layout, columns: list[Samples | list[str]]) -> tuple[MeasuredC
             if moments is None:
                 kept.append(MeasuredColumn(names[place], unit, np.full(len(content), np.nan), tuple(content)))
             else:
-                kept.append(MeasuredColumn(names[place], "s", moments))
+                kept.append(MeasuredColumn(names[place], "s", moments.seconds, begun=moments.begun))
     return tuple(kept)

@@ -1,96 +1,73 @@
 """Why dropped files cannot be read, as the page says it: with its form as the way out, not with options."""
 
 import re
-from typing import Final, NamedTuple
+from typing import Final
 
 from impactcell.german.data_faults import german_message
 from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, with_decimal_commas
+from impactcell.web.texts.fault_pattern import COLUMN, PLACE, FaultPattern
+from impactcell.web.texts.faults_between_files import FAULTS_BETWEEN_FILES
 from impactcell.web.texts.import_notes import page_note
 
-PLACE: Final = r"(?P<place>(?:.+?: )?)"
-COLUMN: Final = r"column (['\"])(?P<column>.+?)\2"
-"""A column by its name, as Python quotes it; the quote is the group behind that of the place."""
-
-
-class _Fault(NamedTuple):
-    pattern: str
-    english: str
-    german: str
-
-
 FAULTS: Final = (
-    _Fault(
+    *FAULTS_BETWEEN_FILES,
+    FaultPattern(
         r"no column of time was found(?P<why>.*); name it with --column .*",
         "no column of time was found{why}; choose it in the form below, or give the sampling rate there",
         "keine Zeitspalte gefunden{why}; unten im Formular wählen, oder dort die Abtastrate angeben",
     ),
-    _Fault(
+    FaultPattern(
         r"has no column of time; name it, .*",
         "has no column of time; choose it in the form below, or give the sampling rate there",
         "hat keine Zeitspalte; unten im Formular wählen, oder dort die Abtastrate angeben",
     ),
-    _Fault(
-        r"has no column of time, where (?P<other>.+) has '(?P<column>.+?)', and the rate .*",
-        "has no column of time, where {other} has “{column}”, and the rate does not say how the two stand to "
-        "each other; export both with their times, and take the rate out of the form below",
-        "hat keine Zeitspalte, {other} aber „{column}“, und die Abtastrate sagt nicht, wie beide zueinander "
-        "liegen; beide mit ihren Zeiten ausgeben und die Abtastrate aus dem Formular nehmen",
-    ),
-    _Fault(
+    FaultPattern(
         r"channel (['\"])(?P<column>.+)\2 of group (['\"])(?P<group>.+)\4 does not say at which moment .*",
         "channel “{column}” of group “{group}” does not say at which moment it begins, where others of the "
         "file begin at different ones; give it its wf_start_time, or export all with one time",
         "Kanal „{column}“ der Gruppe „{group}“ sagt nicht, wann er beginnt, andere der Datei beginnen aber "
         "zu verschiedenen Zeiten; ihm seine wf_start_time geben oder alle mit einer Zeit ausgeben",
     ),
-    _Fault(
+    FaultPattern(
         r"its (?P<key>scale_factor|add_offset) is (['\"])(?P<value>.*)\3, where one number .*",
         "its {key} is “{value}”, where one number is needed; correct it, or apply it and remove "
         "the attribute",
         "{key} ist „{value}“, muss aber eine Zahl sein; berichtigen, oder damit umrechnen und das Attribut "
         "entfernen",
     ),
-    _Fault(r"has no rows", "has no rows", "hat keine Zeilen"),
-    _Fault(
+    FaultPattern(r"has no rows", "has no rows", "hat keine Zeilen"),
+    FaultPattern(
         r"neither position nor force was found among (?P<names>.+); name them with --column .*",
         "neither position nor force was found among {names}; choose their columns in the form below",
         "weder Position noch Kraft gefunden unter {names}: ihre Spalten unten im Formular wählen",
     ),
-    _Fault(
+    FaultPattern(
         COLUMN + r" \((?P<meaning>\w+)\) has no unit; say --unit '.+?=(?P<unit>[^']+)'.*",
         "column “{column}” ({meaning}) has no unit; give it in the form below, {unit} say",
         "Spalte „{column}“ ({meaning}) hat keine Einheit; unten im Formular angeben, etwa {unit}",
     ),
-    _Fault(
+    FaultPattern(
         COLUMN + r" \((?P<meaning>\w+)\) is in (?P<unit>.+?); (?:give its unit|say what that) .*",
         "column “{column}” ({meaning}) is in {unit}; give its unit in the form below, or choose the "
         "right column",
         "Spalte „{column}“ ({meaning}) ist in {unit}; unten im Formular ihre Einheit angeben oder "
         "die richtige Spalte wählen",
     ),
-    _Fault(
+    FaultPattern(
         COLUMN + r" may be the (?P<meaning>\w+) \((?P<reason>.*)\); confirm it with --column .*",
         "column “{column}” may be the {meaning} ({reason}); confirm it in the form below, or choose "
         "the right one",
         "Spalte „{column}“ könnte „{meaning}“ sein ({reason}); unten im Formular bestätigen oder die "
         "richtige wählen",
     ),
-    _Fault(
+    FaultPattern(
         COLUMN + r" is called as the (?P<meaning>\w+), but is in (?P<unit>.+?); .*",
         "column “{column}” is called as the {meaning}, but is in {unit}; give its unit in the form "
         "below, or choose the right column",
         "Spalte „{column}“ heißt wie „{meaning}“, ist aber in {unit}; unten im Formular ihre Einheit "
         "angeben oder die richtige Spalte wählen",
     ),
-    _Fault(
-        COLUMN + r" is in (?P<one>.+) in (?P<first>.+) and in (?P<other>.+) in (?P<second>.+); import the "
-        r"files .*",
-        "column “{column}” is in {one} in {first} and in {other} in {second}; drop the files one by "
-        "one, or give the unit of all in the form below",
-        "Spalte „{column}“ ist in {first} in {one} und in {second} in {other}; die Dateien einzeln "
-        "ablegen oder unten im Formular eine Einheit für alle angeben",
-    ),
-    _Fault(
+    FaultPattern(
         COLUMN
         + r" holds (?P<dates>dates|days) (?P<what>[a-z ]+), as (?P<cell>.+), where the time is needed; "
         r"(?P<way>.+), or leave the column out with .*",
@@ -98,29 +75,21 @@ FAULTS: Final = (
         "Spalte „{column}“ enthält {dates}, etwa {cell}; {way}, oder unten im Formular eine andere Zeit "
         "wählen",
     ),
-    _Fault(
+    FaultPattern(
         COLUMN + r" holds text, as (?P<cell>.+), where the (?P<meaning>\w+) is needed; .*",
         "column “{column}” holds text, as {cell}, where the {meaning} is needed; correct the cell, or choose "
         "another column as the {meaning} in the form below",
         "Spalte „{column}“ enthält Text, etwa {cell}, wo „{meaning}“ nötig ist; die Zelle berichtigen oder "
         "unten im Formular eine andere Spalte dafür wählen",
     ),
-    _Fault(
+    FaultPattern(
         COLUMN + r" holds units in its cells, as (?P<cell>.+), where the (?P<meaning>\w+) is needed; .*",
         "column “{column}” holds units in its cells, as {cell}, where the {meaning} is needed; put the unit "
         "behind the name of the column, or choose another column as the {meaning} in the form below",
         "Spalte „{column}“ enthält Einheiten in den Zellen, etwa {cell}, wo „{meaning}“ nötig ist; die "
         "Einheit hinter den Namen der Spalte setzen oder unten im Formular eine andere Spalte dafür wählen",
     ),
-    _Fault(
-        r"has no (?P<meaning>\w+), which (?P<other>.+) has as column (?P<quote>['\"])(?P<column>.+?)"
-        r"(?P=quote); call it so here too, .*",
-        "has no {meaning}, which {other} has as column “{column}”; call it so here too, or drop the files "
-        "one by one",
-        "ohne „{meaning}“, in {other} ist sie Spalte „{column}“; die Spalte hier ebenso nennen oder die "
-        "Dateien einzeln ablegen",
-    ),
-    _Fault(
+    FaultPattern(
         r"has no (?P<meanings>[a-z ]+), which a campaign of excitation (?P<kind>\w+) needs; where "
         r"(?P<quote>['\"])(?P<column>.+?)(?P=quote) is the speed .*",
         "has no {meanings}, which a campaign of excitation {kind} needs; where “{column}” is the speed of "
@@ -128,46 +97,32 @@ FAULTS: Final = (
         "ohne „{meanings}“, für Anregung „{kind}“ nötig; ist „{column}“ die Geschwindigkeit dessen, was sich "
         "bewegt, sie unten im Formular als Position wählen: sie wird aufsummiert",
     ),
-    _Fault(
+    FaultPattern(
         r"has no (?P<meanings>[a-z ]+), which a campaign of excitation (?P<kind>\w+) needs; name the .*",
         "has no {meanings}, which a campaign of excitation {kind} needs; choose the column in the form below",
         "ohne „{meanings}“, für Anregung „{kind}“ nötig; die Spalte unten im Formular wählen",
     ),
-    _Fault(
+    FaultPattern(
         COLUMN + r" is a speed, whose noise adds up in a position; .*",
         "column “{column}” is a speed, whose noise adds up in a position; of a tap the position has to be "
         "measured: choose another column in the form below",
         "Spalte „{column}“ ist eine Geschwindigkeit, deren Rauschen sich in der Position aufsummiert; bei "
         "einem Stoß muss die Position gemessen sein: unten im Formular eine andere Spalte wählen",
     ),
-    _Fault(
-        r"has no (?P<meaning>\w+), which (?P<other>.+) says beside its columns; say it here too, .*",
-        "has no {meaning}, which {other} says beside its columns; say it here too, or give it for all "
-        "shots in the form below",
-        "ohne „{meaning}“, in {other} steht der Wert neben den Spalten; hier auch angeben oder unten im "
-        "Formular für alle Stöße",
-    ),
-    _Fault(
-        COLUMN + r" has no unit that is known, and in (?P<other>.+) it is in (?P<unit>.+); say the unit .*",
-        "column “{column}” has no unit that is known, and in {other} it is in {unit}; give the unit of all "
-        "in the form below",
-        "Spalte „{column}“ hat keine bekannte Einheit, in {other} steht sie in {unit}; unten im Formular "
-        "eine Einheit für alle angeben",
-    ),
-    _Fault(
+    FaultPattern(
         r"the times are those of " + COLUMN + r", so that the rate has no use; .*",
         "the times are those of column “{column}”, so that the rate has no use; take it out of the "
         "form below",
         "die Zeiten stehen in Spalte „{column}“, die Abtastrate hat keinen Zweck; aus dem Formular nehmen",
     ),
-    _Fault(
+    FaultPattern(
         COLUMN + r" has (?P<values>\d+) values in (?P<rows>\d+) rows, so it does not number shots; .*",
         "column “{column}” has {values} values in {rows} rows, so it does not number shots; choose "
         "another in the form below",
         "Spalte „{column}“ hat {values} Werte in {rows} Zeilen, zählt also keine Stöße; unten im "
         "Formular eine andere wählen",
     ),
-    _Fault(
+    FaultPattern(
         COLUMN
         + r" \((?P<meaning>\w+)\) is (?P<one>.+) and (?P<other>.+) within one record, where a shot has "
         r"one; .*",
@@ -178,7 +133,7 @@ FAULTS: Final = (
         "nur einen Wert: unten im Formular die Spalte wählen, die Stöße zählt, oder einen Wert für "
         "alle angeben",
     ),
-    _Fault(
+    FaultPattern(
         r"(?:"
         + COLUMN
         + r" \()?(?P<meaning>\w+)\)? is (?P<value>.+); it has to be (?P<needed>.+): correct it, or .*",
@@ -186,28 +141,34 @@ FAULTS: Final = (
         "{meaning} ist {value}, muss aber {needed} sein; berichtigen oder unten im Formular für alle "
         "Stöße angeben",
     ),
-    _Fault(
+    FaultPattern(
         r"the lines beside the columns say (?P<meaning>\w+) (?P<one>.+) and (?P<other>.+); give it .*",
         "the lines beside the columns say {meaning} {one} and {other}; give it for all shots in the form "
         "below",
         "die Zeilen neben den Spalten sagen {meaning} {one} und {other}; unten im Formular für alle Stöße "
         "angeben",
     ),
-    _Fault(
+    FaultPattern(
         r"the force shows no contact \(largest (?P<largest>.+) N above noise of (?P<noise>.+) N\); .*",
         "the force shows no contact (largest {largest} N above noise of {noise} N); give the force "
         "at contact in the form below",
         "die Kraft zeigt keine Berührung (höchstens {largest} N über einem Rauschen von {noise} N); "
         "unten im Formular die Kraft bei Berührung angeben",
     ),
-    _Fault(
+    FaultPattern(
         r"the velocity of the actuator is not known(?P<why>.*); name the column .*",
         "the velocity of the actuator is not known{why}; choose the column of the commanded one in "
         "the form below, or give it for all shots there",
         "die Geschwindigkeit des Antriebs ist nicht bekannt{why}; unten im Formular die Spalte der "
         "befohlenen wählen oder sie dort für alle Stöße angeben",
     ),
-    _Fault(
+    FaultPattern(
+        r"(?P<units>.+): some are of a rotation and some of a translation; .*",
+        "{units}: some are of a rotation and some of a translation; give units that fit in the form below",
+        "{units}: teils eine Drehung, teils eine Bewegung längs einer Geraden; unten im Formular passende "
+        "Einheiten angeben",
+    ),
+    FaultPattern(
         r"the position is a short push, as the force of a tap is, .*",
         "the position is a short push, as the force of a tap is, and the force stays where it went, as a "
         "part does: they look swapped; choose their columns, and give their units, in the form below",
@@ -267,6 +228,11 @@ def page_fault(fault: str, language: str) -> tuple[str, str]:
     return "de", f"{refused['place']}{message} (und so in allen {refused['all']} Stößen)"
 
 
+def _german_words(listed: str) -> str:
+    words = {**GERMAN_QUANTITIES, "with": "mit", "and": "und"}
+    return re.sub(r"\w+", lambda word: words.get(word[0], word[0]), listed)
+
+
 def _in_german(said: dict[str, str]) -> dict[str, str]:
     meaning, needed = said.get("meaning", ""), said.get("needed", "")
     why = said.get("why", "")
@@ -275,6 +241,9 @@ def _in_german(said: dict[str, str]) -> dict[str, str]:
             why = german.format_map(match.groupdict())
     return {
         "meaning": GERMAN_QUANTITIES.get(meaning, meaning),
+        "second": GERMAN_QUANTITIES.get(said.get("second", ""), ""),
+        "name": GERMAN_QUANTITIES.get(said.get("name", ""), said.get("name", "")),
+        **{name: _german_words(said.get(name, "")) for name in ("counts", "units")},
         "meanings": "“ und „".join(
             GERMAN_QUANTITIES.get(name, name) for name in said.get("meanings", "").split(" and no ")
         ),

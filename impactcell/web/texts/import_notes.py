@@ -24,6 +24,14 @@ GERMAN: Final = {
     r"was is not known":
         r"Position aus der Geschwindigkeit „\2“ aufsummiert, ab 0 beim ersten Messwert jeder Aufzeichnung: "
         "wo das war, ist nicht bekannt",
+    r"put together: (.+) and (.+), their times are taken to begin at one moment":
+        r"zusammengefügt: \1 und \2, ihre Zeiten gelten als gleichzeitig begonnen",
+    r"put together: (.+) and (.+), their times are taken to begin at one moment; (\d+) more likewise":
+        r"zusammengefügt: \1 und \2, ihre Zeiten gelten als gleichzeitig begonnen; \3 weitere ebenso",
+    r"put together: (.+) and (.+), by the moments that they say, (\S+) s apart":
+        r"zusammengefügt: \1 und \2, nach den Zeitpunkten darin, \3 s auseinander",
+    r"put together: (.+) and (.+), by the moments that they say, (\S+) s apart; (\d+) more likewise":
+        r"zusammengefügt: \1 und \2, nach den Zeitpunkten darin, \3 s auseinander; \4 weitere ebenso",
     r"(\d+) records cut into (\d+) taps where the force begins anew":
         r"\1 Aufzeichnungen in \2 Stöße geteilt, wo die Kraft neu beginnt",
     r"t = 0 put where the force begins, in (\d+) taps?, good to a part of the sampling step of (\S+) ms; "
@@ -54,6 +62,7 @@ GERMAN: Final = {
     r"none of the known quantities": "keine der bekannten Größen",
     r"a speed, as the position has it": "eine Geschwindigkeit, wie sie aus der Lage folgt",
     r"counts the rows": "zählt die Zeilen",
+    r"goes by equal steps, as a time does": "wächst um gleiche Schritte wie eine Zeit",
     r"given": "angegeben",
 }  # fmt: skip
 """Notes and reasons as patterns; what is in none of them stays English."""

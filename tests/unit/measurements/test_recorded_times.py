@@ -11,7 +11,7 @@ from impactcell.cli.app import run_verb
 from impactcell.errors import MeasurementError
 from impactcell.measurements import ColumnMeaning, guess, read_tables
 from impactcell.measurements.given import read_given
-from impactcell.measurements.measured_records import records_of
+from impactcell.measurements.recorders import records_of
 from impactcell.web.texts.import_faults import page_fault
 
 COUNT = 60
@@ -43,7 +43,7 @@ def times(path: Path, *said: str) -> list[dict[str, tuple[float, float]]]:
     assert not mapping.faults
     return [
         {str(name): (float(t[0]), float(np.diff(t).mean())) for name, t in record.times.items()}
-        for record in records_of(tables, mapping)
+        for record in records_of(tables, mapping)[0]
     ]
 
 
@@ -188,7 +188,7 @@ def test_a_rate_is_not_taken_for_one_table_of_a_file_alone(tmp_path: Path) -> No
         assert "--" not in said
         assert "form below" in said or "Formular" in said
     both = read_given({"constants": ["rate=1kHz"], "columns": ["ignored=time"]})
-    (record,) = records_of(tables, guess(tables, both))
+    ((record,), _) = records_of(tables, guess(tables, both))
     np.testing.assert_array_equal(record.times[ColumnMeaning.FORCE], record.times[ColumnMeaning.POSITION])
 
 

@@ -310,3 +310,26 @@ def test_a_row_whose_first_cell_has_no_value_is_no_comment(tmp_path: Path, sign:
     table = one(path)
     assert table.columns[1].values == pytest.approx(np.arange(40) / 8)
     assert np.flatnonzero(np.isnan(table.columns[0].values)).tolist() == [4, 13, 22, 31]
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "columns"),
+    [
+        (
+            ["Weg [µm]"],
+            [f"{k},{k % 10}" for k in range(50)],
+            {"Weg": [k + 0.1 * (k % 10) for k in range(50)]},
+        ),
+        (["rate: 1 kHz", "", "Weg"], ["-0,5"] * 9 + ["3,25"] * 9, {"Weg": [-0.5] * 9 + [3.25] * 9}),
+        (["a,b"], [f"{k},7" for k in range(50)], {"a": list(range(50)), "b": [7] * 50}),
+        ([], [f"{k},7" for k in range(50)], {"column 1": list(range(50)), "column 2": [7] * 50}),
+        (["a"], [f"{k},7.5" for k in range(50)], {"column 1": list(range(50)), "column 2": [7.5] * 50}),
+    ],
+)
+def test_a_column_of_its_own_with_decimal_commas_is_one(
+    tmp_path: Path, head: list[str], rows: list[str], columns: dict[str, list[float]]
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([*head, *rows]), encoding="utf-8")
+    (table,) = read_tables(path)
+    assert {column.name: column.values.tolist() for column in table.columns} == columns
