@@ -108,6 +108,7 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
             quantities[item.meaning] = chosen[taken.column] = unsure
         if taken is None and item.column not in chosen:
             chosen[item.column] = quantities[item.meaning] = item
+    _prefer_position(chosen, quantities, candidates)
     speed = SPEED_OF.get(_dimension_of(quantities.get(ColumnMeaning.POSITION)))
     assignments = tuple(
         chosen.get(name) or _further(column, given, speed) for name, column in columns.items()
@@ -120,6 +121,23 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
     faults += covariates_without_unit(tables, assignments, given.units)
     faults += contrary_units(tables, given.units)
     return Mapping(assignments, given, tuple(faults))
+
+
+def _prefer_position(
+    chosen: dict[str, Assignment],
+    quantities: dict[ColumnMeaning, Assignment],
+    candidates: Sequence[Assignment],
+) -> None:
+    """Take what may be actuator or position, as `Axis.ActPos`, for the position where no other column is."""
+    actuator = quantities.get(ColumnMeaning.ACTUATOR)
+    if actuator is None or actuator.confidence == GIVEN or ColumnMeaning.POSITION in quantities:
+        return
+    for item in candidates:
+        if item.meaning is ColumnMeaning.POSITION and item.column == actuator.column:
+            if item.confidence >= actuator.confidence:
+                del quantities[ColumnMeaning.ACTUATOR]
+                chosen[item.column] = quantities[ColumnMeaning.POSITION] = item
+            return
 
 
 def _beside(tables: Sequence[Table]) -> dict[str, set[str]]:

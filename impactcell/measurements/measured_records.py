@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping as AbstractMapping
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -14,7 +14,7 @@ from impactcell.measurements.mapping import Mapping
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.sampling_step import sampling_step_s
 from impactcell.measurements.scalars import scalars_of
-from impactcell.measurements.table import Lines, Table
+from impactcell.measurements.table import Table
 from impactcell.records import Samples
 
 
@@ -66,9 +66,10 @@ def records_by_file(tables: Sequence[Table], mapping: Mapping) -> dict[str, list
                 continue
             if records and not set(records[-1].values) & set(record.values):
                 records[-1] = _together(records[-1], record)
-            elif record.values:
+            else:
                 records.append(record)
     raise_faults(faults)
+    by_file = {file: [record for record in records if record.values] for file, records in by_file.items()}
     if not any(by_file.values()):
         raise MeasurementError("no table holds a channel")
     return by_file
@@ -122,16 +123,8 @@ def _parts(table: Table, mapping: Mapping, faults: list[str]) -> list[tuple[Tabl
         rows = np.flatnonzero(keys == key)
         number = f"{key:g}" if column.text is None else str(key)
         place = f"{column.name} {number}" if column.text is None else number
-        parts.append((_rows(table, rows), f"{table.title}: {place}", number))
+        parts.append((table.rows(rows), f"{table.title}: {place}", number))
     return parts
-
-
-def _rows(table: Table, rows: Lines) -> Table:
-    columns = tuple(
-        replace(c, values=c.values[rows], text=None if c.text is None else tuple(c.text[row] for row in rows))
-        for c in table.columns
-    )
-    return replace(table, columns=columns, lines=None if table.lines is None else table.lines[rows])
 
 
 def _record(table: Table, place: str, shot: str, mapping: Mapping, faults: list[str]) -> Record | None:

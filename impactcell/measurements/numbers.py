@@ -7,6 +7,10 @@ import math
 import re
 from functools import cache
 
+import numpy as np
+
+from impactcell.records import Samples
+
 MISSING = frozenset(
     ("", "-", "--", "---", "nan", "na", "n/a", "#n/a", "#nv",
      "null", "none", "nil", "1.#qnan", "-1.#ind", "1.#ind")
@@ -75,3 +79,15 @@ def is_grouped(cell: str, decimal: str) -> bool:
     text = cell.strip()
     plain, grouped = _patterns(decimal)
     return plain.fullmatch(text) is None and grouped.fullmatch(text) is not None
+
+
+def plain_numbers(cells: list[str], decimal: str) -> Samples | None:
+    """Numbers that Python reads as they are, but for the decimal mark; None where one cell is another."""
+    if any("_" in cell for cell in cells):
+        return None
+    if decimal == ",":
+        cells = [cell.replace(".", "x").replace(",", ".") for cell in cells]
+    try:
+        return np.fromiter(map(float, cells), dtype=np.float64, count=len(cells))
+    except ValueError:
+        return None

@@ -80,7 +80,7 @@ VOCABULARY = {
         (Dimension.NONE,),
     ),
     ColumnMeaning.VELOCITY: Words(
-        "velocity geschwindigkeit vorschub speed feed commanded_velocity tempo feedrate",
+        "velocity geschwindigkeit vorschub speed velo feed commanded_velocity tempo feedrate",
         "v",
         (Dimension.VELOCITY, Dimension.ANGULAR_VELOCITY),
     ),

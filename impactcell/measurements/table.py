@@ -1,7 +1,7 @@
 """What a measurement file holds, before anybody says what it means."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,18 @@ class Table:
     def column(self, name: str) -> MeasuredColumn | None:
         """Give the column of this name, None where there is none."""
         return next((column for column in self.columns if column.name == name), None)
+
+    def rows(self, rows: NDArray[np.intp]) -> "Table":
+        """Give these rows alone."""
+        columns = tuple(
+            replace(
+                column,
+                values=column.values[rows],
+                text=None if column.text is None else tuple(column.text[row] for row in rows),
+            )
+            for column in self.columns
+        )
+        return replace(self, columns=columns, lines=None if self.lines is None else self.lines[rows])
 
     def place(self, row: int) -> str:
         """Where a row is found: `file:line`, or `file: row n` counted from 1."""

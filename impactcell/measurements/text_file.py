@@ -8,13 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from impactcell.errors import MeasurementError
+from impactcell.measurements.column_groups import by_their_times
 from impactcell.measurements.dialect import DELIMITERS, Dialect, decode, detect, later_lines, split_cells
 from impactcell.measurements.faults import MAX_FAULTS_TOLD
+from impactcell.measurements.labview import is_labview, read_labview
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.moments import read_moments
-from impactcell.measurements.numbers import parse_number
+from impactcell.measurements.numbers import parse_number, plain_numbers
 from impactcell.measurements.table import Lines, MeasuredColumn, Table, unique_names
 from impactcell.measurements.text_layout import Layout, find_layout, is_comment
+from impactcell.measurements.twincat_scope import is_scope_export, read_scope_export
 from impactcell.records import Samples
 
 CHUNK_ROWS = 20_000
@@ -32,6 +35,10 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
     source = str(path)
     text, encoding = decode(path.read_bytes(), source, given.encoding)
     lines = _lines(text, source, limits)
+    if is_labview(lines):
+        return read_labview(source, lines, limits, given.decimal)
+    if is_scope_export(lines):
+        return read_scope_export(source, lines, limits, given.decimal)
     delimiter, decimal, how = detect([line for line in lines if not is_comment(line)], given)
     layout = find_layout(lines, source, delimiter, decimal)
     limits.check_shape(source, len(lines) - layout.first_row, len(layout.names))
@@ -40,16 +47,15 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
     skipped = len(lines) - layout.first_row - len(numbers)
     if skipped:
         notes.append(f"{skipped} blank or comment lines left out")
-    return (
-        Table(
-            source,
-            _kept(layout, columns),
-            attributes=layout.attributes,
-            notes=tuple(notes),
-            lines=numbers,
-            decimal=decimal,
-        ),
+    table = Table(
+        source,
+        _kept(layout, columns),
+        attributes=layout.attributes,
+        notes=tuple(notes),
+        lines=numbers,
+        decimal=decimal,
     )
+    return by_their_times(table)
 
 
 def _lines(text: str, source: str, limits: Limits) -> list[str]:
@@ -181,7 +187,7 @@ class _Rows:
         cells = [row[1][place] for row in rows]
         if place not in self._layout.numeric:
             return cells
-        values = _plain_numbers(cells, self._decimal)
+        values = plain_numbers(cells, self._decimal)
         if values is None:
             values = self._parsed(place, rows)
         if np.isinf(values).any():
@@ -211,18 +217,6 @@ class _Rows:
         self._fault_count += 1
         if len(self._faults) < MAX_FAULTS_TOLD:
             self._faults.append(f"{self._source}:{line}: {message}")
-
-
-def _plain_numbers(cells: list[str], decimal: str) -> Samples | None:
-    """Numbers that Python reads as they are, but for the decimal mark; None where one cell is another."""
-    if any("_" in cell for cell in cells):
-        return None
-    if decimal == ",":
-        cells = [cell.replace(".", "x").replace(",", ".") for cell in cells]
-    try:
-        return np.fromiter(map(float, cells), dtype=np.float64, count=len(cells))
-    except ValueError:
-        return None
 
 
 def _kept(layout: Layout, columns: list[Samples | list[str]]) -> tuple[MeasuredColumn, ...]:

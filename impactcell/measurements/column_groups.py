@@ -1,0 +1,235 @@
+"""Rows of text in which several groups of columns go by times of their own and end where they will."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from impactcell.errors import MeasurementError
+from impactcell.measurements.dialect import split_cells
+from impactcell.measurements.faults import MAX_FAULTS_TOLD
+from impactcell.measurements.moments import EPOCH
+from impactcell.measurements.numbers import parse_number, plain_numbers
+from impactcell.measurements.recognition import WORD_MATCH, ColumnMeaning, name_score
+from impactcell.measurements.table import MeasuredColumn, Table, unique_names
+from impactcell.records import Samples
+
+CHUNK_ROWS = 20_000
+"""Rows whose cells are held as text at a time."""
+TIME = "time"
+"""Name of the times of each group, whatever the file calls them."""
+TICKS_A_SECOND, TICKS_IN_1970 = 10_000_000, 116_444_736_000_000_000
+"""Clock of Windows (FILETIME): steps of 100 ns, from 1601 on."""
+LEAST_DIGITS_OF_TICKS = 17
+"""Digits of such a count from which on it is one: those of the years 1917 to 4769 have 17 to 18."""
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnGroup:
+    """Columns that were sampled at the same times.
+
+    Attributes
+    ----------
+    place : str
+        What faults call it; also the name of its table where the file has several.
+    columns : tuple of int
+        Places of its channels in a row.
+    names : tuple of str
+    units : tuple of str or None
+    time : int or None
+        Place of its times; None where they go by steps.
+    time_unit : str
+    first_s, step_s : float
+        Its first time and their step [s], where no column holds them.
+    begun : datetime64 or None
+        Moment from which the times count.
+    notes : tuple of str
+    """
+
+    place: str
+    columns: tuple[int, ...]
+    names: tuple[str, ...]
+    units: tuple[str | None, ...]
+    time: int | None = None
+    time_unit: str = "s"
+    first_s: float = 0.0
+    step_s: float = 0.0
+    begun: np.datetime64 | None = None
+    notes: tuple[str, ...] = field(default=())
+
+
+@dataclass(slots=True)
+class _Parts:
+    """What has been read of a group."""
+
+    columns: list[list[Samples]]
+    ticks: list[list[str]]
+    lines: list[int]
+
+
+def tables_of_groups(
+    source: str,
+    lines: Sequence[str],
+    groups: Sequence[ColumnGroup],
+    delimiter: str,
+    decimal: str,
+    begin: int = 1,
+) -> list[Table]:
+    """Read rows of text into a table for each group.
+
+    A row belongs to a group where it has a time of it, or where there are no times, any value. Rows that
+    repeat time and values of the one before are left out, as an export makes them that fills up a slow group.
+
+    Parameters
+    ----------
+    source : str
+    lines : sequence of str
+        Rows alone.
+    groups : sequence of ColumnGroup
+    delimiter, decimal : str
+    begin : int
+        Number of the first of the lines.
+
+    Raises
+    ------
+    MeasurementError
+        Cells that are no numbers, by file and line.
+    """
+    faults = _Faults(source)
+    parts = [_Parts([[] for _ in (TIME, *group.columns)], [], []) for group in groups]
+    for first in range(0, len(lines), CHUNK_ROWS):
+        rows = [split_cells(line, delimiter) for line in lines[first : first + CHUNK_ROWS]]
+        for group, read in zip(groups, parts, strict=True):
+            _read(group, rows, begin + first, decimal, read, faults)
+    faults.raise_any()
+    return [
+        _table(source, group, read, several=len(groups) > 1)
+        for group, read in zip(groups, parts, strict=True)
+        if read.lines
+    ]
+
+
+class _Faults:
+    """The first faults of a file, and how many more there are."""
+
+    def __init__(self, source: str) -> None:
+        self._source = source
+        self._told: list[str] = []
+        self._count = 0
+
+    def add(self, line: int, message: str) -> None:
+        self._count += 1
+        if len(self._told) < MAX_FAULTS_TOLD:
+            self._told.append(f"{self._source}:{line}: {message}")
+
+    def raise_any(self) -> None:
+        if self._told:
+            more = self._count - len(self._told)
+            rest = [f"{self._source}: and {more} more faults"] if more else []
+            raise MeasurementError("\n".join(self._told + rest))
+
+
+def _read(
+    group: ColumnGroup, rows: Sequence[Sequence[str]], begin: int, decimal: str, read: _Parts, faults: _Faults
+) -> None:
+    own = (group.time,) if group.time is not None else group.columns
+    present = [
+        index for index, row in enumerate(rows) if any(place < len(row) and row[place] for place in own)
+    ]
+    if not present:
+        return
+    read.lines += [begin + index for index in present]
+    places = group.columns if group.time is None else (group.time, *group.columns)
+    stores = read.columns[1:] if group.time is None else read.columns
+    names = group.names if group.time is None else (TIME, *group.names)
+    for place, store, name in zip(places, stores, names, strict=True):
+        cells = [rows[index][place] if place < len(rows[index]) else "" for index in present]
+        if place == group.time and all(
+            len(cell) >= LEAST_DIGITS_OF_TICKS and cell.isascii() and cell.isdigit() for cell in cells
+        ):
+            read.ticks.append(cells)
+        store.append(_numbers(cells, name, [begin + index for index in present], decimal, faults))
+
+
+def _numbers(cells: list[str], name: str, lines: Sequence[int], decimal: str, faults: _Faults) -> Samples:
+    values = plain_numbers(cells, decimal)
+    if values is None:
+        values = np.full(len(cells), np.nan)
+        for row, cell in enumerate(cells):
+            value = parse_number(cell, decimal)
+            if value is None:
+                mark = "point" if decimal == "." else "comma"
+                faults.add(
+                    lines[row],
+                    f"column {name!r}: {cell[:40]!r} is not a number with decimal {mark}; correct the cell, "
+                    f"or leave it empty",
+                )
+            else:
+                values[row] = value
+    for row in np.flatnonzero(np.isinf(values))[:1].tolist():
+        faults.add(lines[row], f"column {name!r} is infinite")
+    return values
+
+
+def _table(source: str, group: ColumnGroup, read: _Parts, *, several: bool) -> Table:
+    values = [np.concatenate(parts) if parts else np.empty(0) for parts in read.columns]
+    lines = np.array(read.lines, dtype=np.int64)
+    time = values[0].astype(np.float64)
+    unit, begun = group.time_unit, group.begun
+    if group.time is None:
+        time = np.asarray(group.first_s + group.step_s * np.arange(len(lines)), dtype=np.float64)
+    elif sum(map(len, read.ticks)) == len(lines):
+        ticks = np.array([int(cell) for cells in read.ticks for cell in cells], dtype=np.int64)
+        time, unit = np.asarray((ticks - ticks[0]) / TICKS_A_SECOND, dtype=np.float64), "s"
+        begun = moment_of_ticks(int(ticks[0]))
+    kept = np.ones(len(lines), dtype=bool)
+    if group.time is not None:
+        same = [np.diff(column) == 0.0 for column in (time, *values[1:])]
+        kept[1:] = ~np.logical_and.reduce(same)
+    names = unique_names([TIME, *group.names])
+    columns = [MeasuredColumn(names[0], unit, time[kept], begun=begun)]
+    columns += [
+        MeasuredColumn(name, of, column[kept])
+        for name, of, column in zip(names[1:], group.units, values[1:], strict=True)
+        if np.isfinite(column).any()
+    ]
+    repeated = int(np.sum(~kept))
+    notes = group.notes + ((f"{repeated} repeated rows left out",) if repeated else ())
+    return Table(source, tuple(columns), group.place if several else "", notes=notes, lines=lines[kept])
+
+
+def by_their_times(table: Table) -> tuple[Table, ...]:
+    """Give the channels of a table by the times before them, where a column of times comes more than once.
+
+    Pairs of time and value, as some loggers write them, may have rates and ends of their own. Where all times
+    are the same, one of them is enough.
+    """
+    names = [re.sub(r" \(\d+\)$", "", column.name) for column in table.columns]
+    times = [
+        place
+        for place, (column, name) in enumerate(zip(table.columns, names, strict=True))
+        if column.text is None and name == names[0] and name_score(name, ColumnMeaning.TIME)[0] >= WORD_MATCH
+    ]
+    ends = [*times[1:], len(names)]
+    if len(times) < 2 or any(end == place + 1 for place, end in zip(times, ends, strict=True)):
+        return (table,)
+    first = table.columns[0]
+    others = [table.columns[place] for place in times[1:]]
+    if all(
+        np.array_equal(first.values, one.values, equal_nan=True) and first.unit == one.unit for one in others
+    ):
+        kept = tuple(c for place, c in enumerate(table.columns) if place not in times[1:])
+        return (replace(table, columns=kept),)
+    made = []
+    for place, end in zip(times, ends, strict=True):
+        rows = np.flatnonzero(np.isfinite(table.columns[place].values))
+        part = replace(table, columns=table.columns[place:end], name=f"times in column {place + 1}")
+        made.append(part.rows(rows))
+    return tuple(made)
+
+
+def moment_of_ticks(ticks: int) -> np.datetime64:
+    """Give the moment of a count of Windows' clock, 100 ns each since 1601."""
+    moment: np.datetime64 = EPOCH + np.timedelta64(100 * (ticks - TICKS_IN_1970), "ns")
+    return moment
