@@ -14,7 +14,9 @@ DAY_S = 86_400.0
 """Seconds of a day."""
 EPOCH = np.datetime64("1970-01-01", "ns")
 """Day of a time that is written without one."""
-_CLOCK = r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2}(?:[.,]\d+)?))?(?:\s*(?P<half>[AaPp])[Mm])?"
+_CLOCK = (
+    r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2}(?:[.,;]\d+)?))?(?:\s*(?P<half>[AaPp])[Mm])?"
+)
 _BEFORE_CLOCK, _ZONE = r",?[T ]+", r"(?:Z|[+-]\d{2}:?\d{2})?"
 _TWO = r"(\d{1,2})"
 _DATES = (
@@ -130,4 +132,4 @@ def _second_of_day(match: re.Match[str]) -> float:
     hour = int(match["hour"])
     if match["half"] is not None:
         hour = hour % 12 + (12 if match["half"] in "Pp" else 0)
-    return 3600.0 * hour + 60.0 * int(match["minute"]) + float((match["second"] or "0").replace(",", "."))
+    return 3600.0 * hour + 60.0 * int(match["minute"]) + float(re.sub("[,;]", ".", match["second"] or "0"))

@@ -125,8 +125,8 @@ COMMAND_WORDS = frozenset(
 RATE_WORDS = "sample_rate sampling_rate rate_hz abtastrate samplerate fs sampling_frequency abtastfrequenz"
 """Names under which a file says how often it was sampled."""
 STEP_WORDS = (
-    "dt sample_interval wf_increment abtastzeit sampling_interval abtastintervall delta_x increment interval "
-    "sampling_time_interval"
+    "dt dx sample_interval wf_increment abtastzeit sampling_interval abtastintervall delta_x increment "
+    "interval sampling_time_interval"
 )
 """Names under which a file says the step of its time."""
 

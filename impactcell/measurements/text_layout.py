@@ -27,6 +27,8 @@ NO_VALUE = re.compile(r"#(?:nv|n/a)(?=[;,|\s]|$)", re.IGNORECASE)
 UNIT_LABELS = frozenset(("unit", "units", "einheit", "einheiten"))
 """What stands before the units of a row, and is none of them."""
 
+_STATED = re.compile(r"\s*[A-Za-z][A-Za-z0-9_ ]*=.*")
+"""A cell that says something of its column."""
 Row = tuple[int, list[str]]
 """Index of a line, and its cells."""
 
@@ -90,6 +92,8 @@ def find_layout(lines: Sequence[str], source: str, delimiter: str, decimal: str)
                 f"{source}:{index + 1}: {delimiter.join(cells)[:60]!r} is neither a header nor a row of "
                 f"numbers; correct or remove the line"
             )
+    stated = [row for row in above if _is_stated(row[1])]
+    above = [row for row in above if row not in stated]
     unit_row = next((row for row in above if _is_unit_row(row[1])), None)
     header = _header(above, unit_row)
     names, units = _named(header, unit_row, above, width)
@@ -97,8 +101,25 @@ def find_layout(lines: Sequence[str], source: str, delimiter: str, decimal: str)
     return Layout(
         tuple(names), tuple(unit or None for unit in units), numeric, first,
         None if header is None else header[0] + 1, None if unit_row is None else unit_row[0] + 1,
-        _attributes(lines[: min(table_rows, default=first)], delimiter),
+        {**_attributes(lines[: min(table_rows, default=first)], delimiter), **_said_of_all(stated)},
     )  # fmt: skip
+
+
+def _is_stated(cells: Sequence[str]) -> bool:
+    """Whether a row says something of each column and names none, as `SampleRate=1000 Hz` or `dx=0,001 s`."""
+    filled = [cell for cell in cells if cell.strip()]
+    return bool(filled) and all(_STATED.fullmatch(cell) for cell in filled)
+
+
+def _said_of_all(rows: Sequence[Row]) -> dict[str, str]:
+    """Give what such rows say alike of all columns."""
+    said = {}
+    for _, cells in rows:
+        filled = {cell.strip() for cell in cells if cell.strip()}
+        if len(filled) == 1:
+            key, _, value = filled.pop().partition("=")
+            said[key.strip()] = value.strip()
+    return said
 
 
 def _has_number(cells: Sequence[str], numeric: frozenset[int], decimal: str) -> bool:
@@ -122,6 +143,8 @@ def _named(
     """Names and units of the columns, from a row each or from one row of both."""
     names, units = [""] * width, [""] * width
     if header is None:
+        if unit_row is not None:
+            units = [cell.strip("[]() ") if parse_unit(cell) else "" for cell in unit_row[1]]
         return names, units
     for place, cell in enumerate(header[1]):
         names[place], unit = split_unit(cell)
@@ -198,6 +221,8 @@ def _rows_above(lines: Sequence[str], first: int, delimiter: str, width: int, so
                 break
             continue
         cells = _header_cells(line, delimiter, width)
+        if len(cells) == width + 1 and not cells[-1]:
+            cells.pop()  # a delimiter at its end that the rows lack
         if len(cells) != width or len(rows) == HEADER_ROWS:
             near = not rows and width > 2 and abs(len(cells) - width) == 1 and not is_comment(lines[index])
             if near or (not rows and len(cells) > width > 1):

@@ -333,3 +333,67 @@ def test_a_column_of_its_own_with_decimal_commas_is_one(
     path.write_text("\n".join([*head, *rows]), encoding="utf-8")
     (table,) = read_tables(path)
     assert {column.name: column.values.tolist() for column in table.columns} == columns
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "columns"),
+    [
+        pytest.param(
+            ["HBM_CATMAN_DATAFILE_50", "", "T0\t28.11.2026 10:00:00", "",
+             "Time 1 - default sample rate [s]\tForce [N]\tWeg [mm]",
+             "SampleRate=1000.0 Hz\tSampleRate=1000.0 Hz\tSampleRate=1000.0 Hz",
+             "Format=Default\tFormat=2\tFormat=2", "\t\t"],
+            "{k:.6f}\t{f:.6f}\t{x:.6f}", {"Time 1 - default sample rate": "s", "Force": "N", "Weg": "mm"},
+            id="catman",
+        ),
+        pytest.param(
+            ["# imc", "Kraft;Weg", "x0=0;x0=0", "dx=0,001 s;dx=0,001 s", "N;mm"],
+            "{f:.6f};{x:.6f}", {"Kraft": "N", "Weg": "mm"}, id="imc",
+        ),
+        pytest.param(
+            ["x-axis,1,2", "second,Volt,Volt"], "{k:.6f},{f:.6f},{x:.6f}",
+            {"column 1": "second", "column 2": "Volt", "column 3": "Volt"}, id="Keysight",
+        ),
+        pytest.param(
+            ["X,CH1,CH2,Start,Increment,", "Sequence,Volt,Volt,-2e-1,1e-3,"], "{k:.1f},{f:.6f},{x:.6f},,",
+            {"Sequence": None, "CH1": "Volt", "CH2": "Volt", "-2e-1": None, "1e-3": None}, id="Rigol",
+        ),
+        pytest.param(
+            ["Time,Channel A,Channel B", "(ms),(V),(mV)", ""], "{k:.6f},{f:.6f},{x:.6f}",
+            {"Time": "ms", "Channel A": "V", "Channel B": "mV"}, id="PicoScope",
+        ),
+        pytest.param(
+            ["Data Header:\t0\tTime:\t0.123\tSec", "Station Name:\tx",
+             "Time\tAxial Displacement\tAxial Force", "Sec\tmm\tN"],
+            "{k:.6f}\t{x:.6f}\t{f:.6f}", {"Time": "Sec", "Axial Displacement": "mm", "Axial Force": "N"},
+            id="MTS",
+        ),
+        pytest.param(
+            ["sep=;", "Time [ms];r[21] Actual speed [1/min];r[80] Torque [Nm]"], "{k:.6f};{f:.6f};{x:.6f}",
+            {"Time": "ms", "r[21] Actual speed": "1/min", "r[80] Torque": "Nm"}, id="drive",
+        ),
+    ],
+)  # fmt: skip
+def test_what_loggers_and_oscilloscopes_write(
+    tmp_path: Path, head: list[str], row: str, columns: dict[str, str | None]
+) -> None:
+    wanted = {"k": [float(k) for k in range(40)], "f": [7.5 - k for k in range(40)]}
+    path = tmp_path / "a.csv"
+    for decimal in "." if "," in row else ".,":
+        rows = [row.format(k=k, f=7.5 - k, x=0.25 * k).replace(".", decimal) for k in range(40)]
+        path.write_text("\r\n".join([*head, *rows]) + "\r\n", encoding="utf-8")
+        (table,) = read_tables(path)
+        assert {column.name: column.unit for column in table.columns} == columns
+        read = [column.values.tolist() for column in table.columns]
+        assert all(values in read for key, values in wanted.items() if "{" + key in row)
+
+
+def test_a_trend_of_a_plc_with_days_and_clock_times_apart(tmp_path: Path) -> None:
+    rows = [f"Data,28/11/2026,10:00:00;{k:03d},{k * 0.5},{k * k}" for k in range(300)]
+    head = ['Header: ,"trend"', "Sample Period: ,1,ms", 'Header:,"Date","Time","Force","Pos"']
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([*head, *rows]), encoding="utf-8")
+    (table,) = read_tables(path)
+    time = table.column("Time")
+    assert time is not None
+    np.testing.assert_allclose(time.values, 1e-3 * np.arange(300), atol=1e-9)
