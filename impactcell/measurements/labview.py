@@ -24,6 +24,8 @@ COMMENT = "Comment"
 """Last column of each segment: text, which is left out."""
 SEPARATOR = re.compile(r"Separator([\t,;])")
 """Line that says what separates cells, and is separated so itself."""
+UNITS = {"volts": "V", "amps": "A"}
+"""Units as LabVIEW writes them, where that is no word for one elsewhere."""
 GAP_STEPS = 0.5
 """How many steps the next segment may lie beside the place of the next sample to go on with its record."""
 
@@ -175,7 +177,8 @@ def _groups(
         units = []
         for column, (_, unit) in zip(columns, said, strict=True):
             at = column - 1 if how == "multi" else channels.index(column)
-            units.append(_of(header, "Y_Unit_Label", at) or unit)
+            label = _of(header, "Y_Unit_Label", at)
+            units.append(UNITS.get(label.lower(), label) or unit)
         made.append(
             ColumnGroup(
                 place,

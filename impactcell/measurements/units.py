@@ -106,7 +106,6 @@ _WORDS = {
     "microns": "um", "mikrometer": "um", "micrometer": "um", "inch": "in", "inches": "in", '"': "in",
     "degree": "deg", "degrees": "deg", "grad": "deg", "°": "deg", "radian": "rad", "radians": "rad",
     "lbs": "lb", "°c": "degC", "°f": "degF", "u/min": "rpm", "1/min": "rpm", "1/s": "Hz", "volt": "V",
-    "volts": "V", "amps": "A", "amperes": "A",
     "ampere": "A", "kilogram": "kg", "kilogramm": "kg", "percent": "%", "-": "1", "hz": "Hz", "khz": "kHz",
     "kn": "kN", "dan": "daN", "pa": "Pa", "mpa": "MPa", "hertz": "Hz", "kilohertz": "kHz",
     "megahertz": "MHz",

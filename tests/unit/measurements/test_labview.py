@@ -224,3 +224,9 @@ def test_segments_of_a_trigger_are_a_shot_each(tmp_path: Path) -> None:
         np.testing.assert_allclose(
             shot.position.values, 2e-4 * np.cos(turn * shot.position.time_s), atol=1e-10
         )
+
+
+def test_units_as_labview_writes_them_are_known(tmp_path: Path) -> None:
+    segment = Segment({"Force": np.arange(9.0), "Current": np.arange(9.0)}, units=("Volts", "Amps"))
+    (table,) = read_tables(write(tmp_path / "a.lvm", [segment]))
+    assert [column.unit for column in table.columns] == ["s", "V", "A"]
