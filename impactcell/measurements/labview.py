@@ -148,23 +148,22 @@ def _mark(rows: Sequence[str], delimiter: str) -> str:
 def _groups(
     header: _Header, of_file: Mapping[str, tuple[str, ...]], place: str, decimal: str, where: str
 ) -> list[ColumnGroup]:
-    """Channels of a segment by what their times are."""
+    """Channels of a segment by what their times are; what is said of one has no cell for the first column."""
     names = header.names[: -1 if header.names[-1] == COMMENT else None]
     how = _first(of_file, "X_Columns").lower()
-    channels = [column for column, name in enumerate(names) if name != NAMES or (column and how != "multi")]
-    if how == "multi":
-        channels = [column for column in range(len(names)) if names[column] != NAMES]
+    channels = [
+        column for column in range(len(names)) if column and (how != "multi" or names[column] != NAMES)
+    ]
     groups: dict[tuple[int | None, float, float, np.datetime64 | None], list[int]] = {}
-    for order, column in enumerate(channels):
-        at = column - 1 if how == "multi" else order
-        begun = _begun(header, at)
+    for column in channels:
+        begun = _begun(header, column - 1)
         if how == "multi":
             time = max((k for k in range(column) if names[k] == NAMES), default=None)
         else:
             time = 0 if how == "one" else None
         first = step = 0.0
         if time is None:
-            first, step = (_number(header, key, at, decimal) for key in ("X0", "Delta_X"))
+            first, step = (_number(header, key, column - 1, decimal) for key in ("X0", "Delta_X"))
             if not (math.isfinite(first) and 0.0 < step < math.inf):
                 raise MeasurementError(
                     f"{where}: channel {names[column]!r} says no step of its times (Delta_X); export X "
@@ -176,8 +175,7 @@ def _groups(
         said = [split_unit(names[column]) for column in columns]
         units = []
         for column, (_, unit) in zip(columns, said, strict=True):
-            at = column - 1 if how == "multi" else channels.index(column)
-            label = _of(header, "Y_Unit_Label", at)
+            label = _of(header, "Y_Unit_Label", column - 1)
             units.append(UNITS.get(label.lower(), label) or unit)
         made.append(
             ColumnGroup(
