@@ -128,7 +128,7 @@ def _prefer_position(
     quantities: dict[ColumnMeaning, Assignment],
     candidates: Sequence[Assignment],
 ) -> None:
-    """Take what may be actuator or position, as `Axis.ActPos`, for the position where no other column is."""
+    """Take what may be actuator or position, as of an axis, for the position where no other column is."""
     actuator = quantities.get(ColumnMeaning.ACTUATOR)
     if actuator is None or actuator.confidence == GIVEN or ColumnMeaning.POSITION in quantities:
         return

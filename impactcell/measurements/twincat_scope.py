@@ -170,7 +170,7 @@ def _cell(rows: Mapping[str, Sequence[str]], key: str, column: int) -> str:
 
 
 def _unit(rows: Mapping[str, Sequence[str]], column: int) -> str | None:
-    """Give the unit of a channel, as `dV` of `dV (Voltage)`."""
+    """Give the unit of a channel without the quantity in brackets behind it."""
     text = _cell(rows, "Unit", column)
     return None if text in ("", NO_UNIT) else re.sub(r"\s*\([^()]*\)$", "", text)
 
