@@ -21,8 +21,8 @@ TIME = "time"
 """Name of the times of each group, whatever the file calls them."""
 TICKS_A_SECOND, TICKS_IN_1970 = 10_000_000, 116_444_736_000_000_000
 """Clock of Windows (FILETIME): steps of 100 ns, from 1601 on."""
-LEAST_DIGITS_OF_TICKS = 17
-"""Digits of such a count from which on it is one: those of the years 1917 to 4769 have 17 to 18."""
+LEAST_TICKS, MOST_TICKS = TICKS_IN_1970 - 2**63 // 100 + 1, TICKS_IN_1970 + 2**63 // 100 - 1
+"""Counts of 1677 and 2262, where nanoseconds from 1970 end; what is less may be a time of any unit."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,9 +145,7 @@ def _read(
     names = group.names if group.time is None else (TIME, *group.names)
     for place, store, name in zip(places, stores, names, strict=True):
         cells = [rows[index][place] if place < len(rows[index]) else "" for index in present]
-        if place == group.time and all(
-            len(cell) >= LEAST_DIGITS_OF_TICKS and cell.isascii() and cell.isdigit() for cell in cells
-        ):
+        if place == group.time and all(map(is_ticks, cells)):
             read.ticks.append(cells)
         store.append(_numbers(cells, name, [begin + index for index in present], decimal, faults))
 
@@ -227,6 +225,11 @@ def by_their_times(table: Table) -> tuple[Table, ...]:
         part = replace(table, columns=table.columns[place:end], name=f"times in column {place + 1}")
         made.append(part.rows(rows))
     return tuple(made)
+
+
+def is_ticks(cell: str) -> bool:
+    """Whether a cell is a count of Windows' clock."""
+    return cell.isascii() and cell.isdigit() and len(cell) < 19 and LEAST_TICKS <= int(cell) <= MOST_TICKS
 
 
 def moment_of_ticks(ticks: int) -> np.datetime64:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from impactcell.errors import MeasurementError
-from impactcell.measurements.column_groups import ColumnGroup, moment_of_ticks, tables_of_groups
+from impactcell.measurements.column_groups import ColumnGroup, is_ticks, moment_of_ticks, tables_of_groups
 from impactcell.measurements.dialect import split_cells
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.numbers import is_missing, parse_number
@@ -133,7 +133,7 @@ def _has_decimal_comma(rows: Sequence[str]) -> bool:
 def _begun(lines: Sequence[str], delimiter: str) -> np.datetime64 | None:
     for line in lines[1:HEAD_LINES]:
         cells = _cells(line, delimiter)
-        if STARTS.match(line) and len(cells) > 1 and cells[1].isdigit():
+        if STARTS.match(line) and len(cells) > 1 and is_ticks(cells[1]):
             return moment_of_ticks(int(cells[1]))
     return None
 

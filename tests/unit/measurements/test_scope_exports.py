@@ -152,6 +152,14 @@ def test_units_and_scalings_are_told(tmp_path: Path) -> None:
     assert "'fForce' has a scaling of -10 and 0 in the Scope: taken as exported" in table.notes
 
 
+@pytest.mark.parametrize("ticks", ["9" * 18, "9" * 40, "1" + 16 * "0", "12", "-1", "²"])
+def test_a_begin_that_no_clock_shows_is_none(tmp_path: Path, ticks: str) -> None:
+    path = export(tmp_path / "a.csv", [Group(1.0, ["fForce"], np.arange(9.0)[None])])
+    path.write_text(path.read_text(encoding="utf-8").replace(str(BEGUN_TICKS), ticks), encoding="utf-8")
+    (table,) = read_tables(path)
+    assert table.columns[0].begun is None
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
