@@ -214,9 +214,8 @@ def by_their_times(table: Table) -> tuple[Table, ...]:
         return (table,)
     first = table.columns[0]
     others = [table.columns[place] for place in times[1:]]
-    if all(
-        np.array_equal(first.values, one.values, equal_nan=True) and first.unit == one.unit for one in others
-    ):
+    same = [np.array_equal(first.values, one.values, equal_nan=True) for one in others]
+    if all(same) and {(one.unit, one.begun) for one in others} == {(first.unit, first.begun)}:
         kept = tuple(c for place, c in enumerate(table.columns) if place not in times[1:])
         return (replace(table, columns=kept),)
     made = []

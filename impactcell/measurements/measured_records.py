@@ -200,12 +200,20 @@ def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:
     return time
 
 
+def later_s(first: Record, second: Record) -> float:
+    """How much later than those of the first the times of the second begin [s]; 0 where one does not say."""
+    if first.begun is None or second.begun is None:
+        return 0.0
+    return float((second.begun - first.begun) / np.timedelta64(1, "s"))
+
+
 def _together(first: Record, second: Record) -> Record:
+    begun, later = (first.begun, later_s(first, second)) if first.times else (second.begun, 0.0)
     return Record(
         first.place,
-        {**first.times, **second.times},
+        {**first.times, **{channel: time + later for channel, time in second.times.items()}},
         {**first.values, **second.values},
         {**first.scalars, **second.scalars},
         first.shot,
-        first.begun,
+        begun,
     )

@@ -6,11 +6,9 @@ from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
-import numpy as np
-
 from impactcell.errors import MeasurementError
 from impactcell.measurements.mapping import Mapping
-from impactcell.measurements.measured_records import Record, records_by_file
+from impactcell.measurements.measured_records import Record, later_s, records_by_file
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.table import Table
 
@@ -104,10 +102,9 @@ def _at_one_time(parts: Sequence[Record]) -> tuple[Record, str]:
     """Put the channels of parts of one record together, by their moments where all say them, and tell how."""
     places = " and ".join(part.place for part in parts)
     shown = [Path(part.place.partition(": ")[0]).name for part in parts]
-    begun = [part.begun for part in parts if part.begun is not None]
     later, how = [0.0] * len(parts), "their times are taken to begin at one moment"
-    if len(begun) == len(parts):
-        later = [float((moment - begun[0]) / np.timedelta64(1, "s")) for moment in begun]
+    if all(part.begun is not None for part in parts):
+        later = [later_s(parts[0], part) for part in parts]
         apart = max(later) - min(later)
         how = f"by the moments that they say, {apart:.6g} s apart"
     times = {

@@ -231,3 +231,21 @@ def test_times_that_are_all_the_same_are_one(tmp_path: Path) -> None:
     path.write_text("\n".join(["Time [ms];Force [N];Time [ms];Weg [mm];shot", *rows]), encoding="utf-8")
     (table,) = read_tables(path)
     assert [column.name for column in table.columns] == ["Time", "Force", "Weg", "shot"]
+
+
+@pytest.mark.parametrize("later_s", [0.35, 0.0])
+def test_pairs_of_moments_stand_to_each_other_as_they_say(tmp_path: Path, later_s: float) -> None:
+    """Two channels of one length and step, of which the second begins later: their seconds look the same."""
+    path = tmp_path / "a.csv"
+    rows = [
+        f"28.11.2026 10:00:{1 + 1e-3 * k:06.3f};{k};28.11.2026 10:00:{1 + later_s + 1e-3 * k:06.3f};{2 * k}"
+        for k in range(900)
+    ]
+    path.write_text("\n".join(["Zeit;Force [N];Zeit;Weg [mm]", *rows]), encoding="utf-8")
+    tables = read_tables(path)
+    assert len(tables) == (2 if later_s else 1)
+    imported = make_campaign(tables, guess(tables, read_given({"constants": ["mass=2kg"]}, None, "driven")))
+    (shot,) = imported.campaign.shots
+    assert shot.force is not None
+    assert shot.position is not None
+    assert shot.position.time_s[0] - shot.force.time_s[0] == pytest.approx(later_s, abs=1e-9)
