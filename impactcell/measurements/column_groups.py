@@ -2,21 +2,17 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.errors import MeasurementError
+from impactcell.measurements.cells import CHUNK_ROWS, LineFaults, numbers_of
 from impactcell.measurements.dialect import split_cells
-from impactcell.measurements.faults import MAX_FAULTS_TOLD
 from impactcell.measurements.moments import EPOCH
-from impactcell.measurements.numbers import parse_number, plain_numbers
 from impactcell.measurements.recognition import WORD_MATCH, ColumnMeaning, name_score
 from impactcell.measurements.table import MeasuredColumn, Table, unique_names
 from impactcell.records import Samples
 
-CHUNK_ROWS = 20_000
-"""Rows whose cells are held as text at a time."""
 TIME = "time"
 """Name of the times of each group, whatever the file calls them."""
 TICKS_A_SECOND, TICKS_IN_1970 = 10_000_000, 116_444_736_000_000_000
@@ -56,7 +52,7 @@ class ColumnGroup:
     first_s: float = 0.0
     step_s: float = 0.0
     begun: np.datetime64 | None = None
-    notes: tuple[str, ...] = field(default=())
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(slots=True)
@@ -96,7 +92,7 @@ def tables_of_groups(
     MeasurementError
         Cells that are no numbers, by file and line.
     """
-    faults = _Faults(source)
+    faults = LineFaults(source)
     parts = [_Parts([[] for _ in (TIME, *group.columns)], [], []) for group in groups]
     for first in range(0, len(lines), CHUNK_ROWS):
         rows = [split_cells(line, delimiter) for line in lines[first : first + CHUNK_ROWS]]
@@ -110,28 +106,13 @@ def tables_of_groups(
     ]
 
 
-class _Faults:
-    """The first faults of a file, and how many more there are."""
-
-    def __init__(self, source: str) -> None:
-        self._source = source
-        self._told: list[str] = []
-        self._count = 0
-
-    def add(self, line: int, message: str) -> None:
-        self._count += 1
-        if len(self._told) < MAX_FAULTS_TOLD:
-            self._told.append(f"{self._source}:{line}: {message}")
-
-    def raise_any(self) -> None:
-        if self._told:
-            more = self._count - len(self._told)
-            rest = [f"{self._source}: and {more} more faults"] if more else []
-            raise MeasurementError("\n".join(self._told + rest))
-
-
 def _read(
-    group: ColumnGroup, rows: Sequence[Sequence[str]], begin: int, decimal: str, read: _Parts, faults: _Faults
+    group: ColumnGroup,
+    rows: Sequence[Sequence[str]],
+    begin: int,
+    decimal: str,
+    read: _Parts,
+    faults: LineFaults,
 ) -> None:
     own = (group.time,) if group.time is not None else group.columns
     present = [
@@ -147,27 +128,7 @@ def _read(
         cells = [rows[index][place] if place < len(rows[index]) else "" for index in present]
         if place == group.time and all(map(is_ticks, cells)):
             read.ticks.append(cells)
-        store.append(_numbers(cells, name, [begin + index for index in present], decimal, faults))
-
-
-def _numbers(cells: list[str], name: str, lines: Sequence[int], decimal: str, faults: _Faults) -> Samples:
-    values = plain_numbers(cells, decimal)
-    if values is None:
-        values = np.full(len(cells), np.nan)
-        for row, cell in enumerate(cells):
-            value = parse_number(cell, decimal)
-            if value is None:
-                mark = "point" if decimal == "." else "comma"
-                faults.add(
-                    lines[row],
-                    f"column {name!r}: {cell[:40]!r} is not a number with decimal {mark}; correct the cell, "
-                    f"or leave it empty",
-                )
-            else:
-                values[row] = value
-    for row in np.flatnonzero(np.isinf(values))[:1].tolist():
-        faults.add(lines[row], f"column {name!r} is infinite")
-    return values
+        store.append(numbers_of(cells, [begin + index for index in present], name, decimal, faults))
 
 
 def _table(source: str, group: ColumnGroup, read: _Parts, *, several: bool) -> Table:

@@ -8,20 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from impactcell.errors import MeasurementError
+from impactcell.measurements.cells import CHUNK_ROWS, LineFaults, numbers_of
 from impactcell.measurements.column_groups import by_their_times
 from impactcell.measurements.dialect import DELIMITERS, Dialect, decode, detect, later_lines, split_cells
-from impactcell.measurements.faults import MAX_FAULTS_TOLD
 from impactcell.measurements.labview import is_labview, read_labview
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.moments import read_moments
-from impactcell.measurements.numbers import parse_number, plain_numbers
 from impactcell.measurements.table import Lines, MeasuredColumn, Table, unique_names
 from impactcell.measurements.text_layout import Layout, find_layout, is_comment
 from impactcell.measurements.twincat_scope import is_scope_export, read_scope_export
 from impactcell.records import Samples
-
-CHUNK_ROWS = 20_000
-"""Rows whose cells are held as text at a time: some 10 MB."""
 
 
 def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
@@ -122,14 +118,12 @@ class _Rows:
     def __init__(
         self, source: str, lines: Sequence[str], layout: Layout, delimiter: str, decimal: str
     ) -> None:
-        self._source = source
         self._lines = lines
         self._layout = layout
         self._delimiter = delimiter
         self._decimal = decimal
         self._width = len(layout.names)
-        self._faults: list[str] = []
-        self._fault_count = 0
+        self._faults = LineFaults(source)
 
     def read(self) -> tuple[list[Samples | list[str]], Lines]:
         """Columns, and the line of each row.
@@ -145,10 +139,7 @@ class _Rows:
             rows = self._cells(chunk)
             numbers += [number for number, _ in rows]
             parts.append([self._column(place, rows) for place in range(self._width)])
-        if self._faults:
-            rest = self._fault_count - len(self._faults)
-            more = [f"{self._source}: and {rest} more faults"] if rest else []
-            raise MeasurementError("\n".join(self._faults + more))
+        self._faults.raise_any()
         columns: list[Samples | list[str]] = []
         for place in range(self._width):
             pieces = [part[place] for part in parts]
@@ -178,7 +169,7 @@ class _Rows:
             if len(cells) != self._width:
                 if number == len(self._lines) and len(cells) < self._width:
                     continue  # a recording that was cut off in the middle of a line
-                self._fault(number, f"{len(cells)} cells where the table has {self._width}")
+                self._faults.add(number, f"{len(cells)} cells where the table has {self._width}")
                 continue
             rows.append((number, cells))
         return rows
@@ -187,36 +178,8 @@ class _Rows:
         cells = [row[1][place] for row in rows]
         if place not in self._layout.numeric:
             return cells
-        values = plain_numbers(cells, self._decimal)
-        if values is None:
-            values = self._parsed(place, rows)
-        if np.isinf(values).any():
-            row = int(np.flatnonzero(np.isinf(values))[0])
-            self._fault(rows[row][0], f"column {self._name(place)} is infinite")
-        return values
-
-    def _parsed(self, place: int, rows: list[tuple[int, list[str]]]) -> Samples:
-        values = np.full(len(rows), np.nan)
-        for row, (number, cells) in enumerate(rows):
-            value = parse_number(cells[place], self._decimal)
-            if value is None:
-                mark = "point" if self._decimal == "." else "comma"
-                self._fault(
-                    number,
-                    f"column {self._name(place)}: {cells[place][:40]!r} is not a number with decimal {mark}; "
-                    f"correct the cell, or leave it empty",
-                )
-            else:
-                values[row] = value
-        return values
-
-    def _name(self, place: int) -> str:
-        return repr(self._layout.names[place] or f"column {place + 1}")
-
-    def _fault(self, line: int, message: str) -> None:
-        self._fault_count += 1
-        if len(self._faults) < MAX_FAULTS_TOLD:
-            self._faults.append(f"{self._source}:{line}: {message}")
+        name = self._layout.names[place] or f"column {place + 1}"
+        return numbers_of(cells, [number for number, _ in rows], name, self._decimal, self._faults)
 
 
 def _kept(layout: Layout, columns: list[Samples | list[str]]) -> tuple[MeasuredColumn, ...]:

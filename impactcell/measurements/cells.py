@@ -1,0 +1,58 @@
+"""Cells of text as numbers; those that are none are told with their lines, the first of them in full."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from impactcell.errors import MeasurementError
+from impactcell.measurements.faults import MAX_FAULTS_TOLD
+from impactcell.measurements.numbers import parse_number, plain_numbers
+from impactcell.records import Samples
+
+CHUNK_ROWS = 20_000
+"""Rows whose cells are held as text at a time: some 10 MB."""
+
+
+class LineFaults:
+    """The first faults of a text file, and how many more there are."""
+
+    def __init__(self, source: str) -> None:
+        self._source = source
+        self._told: list[str] = []
+        self._count = 0
+
+    def add(self, line: int, message: str) -> None:
+        """Tell what is wrong in a line."""
+        self._count += 1
+        if len(self._told) < MAX_FAULTS_TOLD:
+            self._told.append(f"{self._source}:{line}: {message}")
+
+    def raise_any(self) -> None:
+        """Raise `MeasurementError` with what has been told, if anything."""
+        if self._told:
+            rest = self._count - len(self._told)
+            more = [f"{self._source}: and {rest} more faults"] if rest else []
+            raise MeasurementError("\n".join(self._told + more))
+
+
+def numbers_of(
+    cells: list[str], lines: Sequence[int], name: str, decimal: str, faults: LineFaults
+) -> Samples:
+    """Give the numbers of the cells of a column, nan where one is empty or, with a fault, no number."""
+    values = plain_numbers(cells, decimal)
+    if values is None:
+        values = np.full(len(cells), np.nan)
+        for row, cell in enumerate(cells):
+            value = parse_number(cell, decimal)
+            if value is None:
+                mark = "point" if decimal == "." else "comma"
+                faults.add(
+                    lines[row],
+                    f"column {name!r}: {cell[:40]!r} is not a number with decimal {mark}; correct the cell, "
+                    f"or leave it empty",
+                )
+            else:
+                values[row] = value
+    for row in np.flatnonzero(np.isinf(values))[:1].tolist():
+        faults.add(lines[row], f"column {name!r} is infinite")
+    return values
