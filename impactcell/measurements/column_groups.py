@@ -1,6 +1,5 @@
 """Rows of text in which several groups of columns go by times of their own and end where they will."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -10,7 +9,7 @@ from impactcell.measurements.cells import CHUNK_ROWS, LineFaults, numbers_of
 from impactcell.measurements.dialect import split_cells
 from impactcell.measurements.moments import EPOCH
 from impactcell.measurements.recognition import WORD_MATCH, ColumnMeaning, name_score
-from impactcell.measurements.table import MeasuredColumn, Table, unique_names
+from impactcell.measurements.table import AGAIN, MeasuredColumn, Table, unique_names
 from impactcell.records import Samples
 
 TIME = "time"
@@ -164,7 +163,7 @@ def by_their_times(table: Table) -> tuple[Table, ...]:
     Pairs of time and value, as some loggers write them, may have rates and ends of their own. Where all times
     are the same, one of them is enough.
     """
-    names = [re.sub(r" \(\d+\)$", "", column.name) for column in table.columns]
+    names = [AGAIN.sub("", column.name) for column in table.columns]
     times = [
         place
         for place, (column, name) in enumerate(zip(table.columns, names, strict=True))

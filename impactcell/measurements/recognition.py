@@ -4,6 +4,7 @@ import enum
 import re
 from dataclasses import dataclass
 
+from impactcell.measurements.table import AGAIN
 from impactcell.measurements.units import Dimension
 
 
@@ -168,7 +169,7 @@ def is_kind_of(name: str, meaning: ColumnMeaning) -> bool:
 def name_score(name: str, meaning: ColumnMeaning) -> tuple[float, str]:
     """How sure the name of a column makes that it is of this quantity, 0 to 1, and the word that says so."""
     words = VOCABULARY[meaning]
-    text = normalised(re.sub(r" \(\d+\)$", "", name))  # a name that comes again is as good as the first
+    text = normalised(AGAIN.sub("", name))  # a name that comes again is as good as the first
     known, symbols = words.words.split(), words.symbols.split()
     if text in known:
         return WORD_MATCH, text

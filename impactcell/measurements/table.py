@@ -1,5 +1,6 @@
 """What a measurement file holds, before anybody says what it means."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -103,6 +104,10 @@ class Table:
         if self.lines is not None:
             return f"{self.source}:{int(self.lines[row])}"
         return f"{self.title}: row {row + 1}"
+
+
+AGAIN = re.compile(r" \(\d+\)$")
+"""What stands behind a name that was there before."""
 
 
 def unique_names(names: list[str]) -> list[str]:

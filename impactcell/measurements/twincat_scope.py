@@ -15,7 +15,7 @@ from impactcell.measurements.column_groups import ColumnGroup, is_ticks, moment_
 from impactcell.measurements.dialect import split_cells
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.numbers import is_missing, parse_number
-from impactcell.measurements.table import MeasuredColumn, Table
+from impactcell.measurements.table import AGAIN, MeasuredColumn, Table
 
 BEGINS = re.compile(r'"?Name"?([\t;,:| ])')
 """First line: the word, and what separates the cells of the file."""
@@ -25,8 +25,6 @@ STARTS = re.compile(r'"?Start ?time', re.IGNORECASE)
 HEAD_LINES = 12
 """Lines among which the moment of the begin stands."""
 NO_UNIT = "(None)"
-COPY = re.compile(r" \(\d+\)$")
-"""What the Scope puts behind a name that it has already."""
 END = "EOF"
 
 
@@ -99,7 +97,7 @@ def _without_copies(tables: Sequence[Table]) -> tuple[list[Table], int]:
         time, *channels = table.columns
         own = [time]
         for channel in channels:
-            of = COPY.sub("", channel.name)
+            of = AGAIN.sub("", channel.name)
             before = seen.setdefault(of, (time, channel))
             is_copy = before[1] is not channel and all(
                 np.array_equal(one.values, other.values, equal_nan=True)
