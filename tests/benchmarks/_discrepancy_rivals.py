@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
+from impactcell.campaign import Campaign
 from impactcell.discrepancy.data import noise_floor
 from impactcell.discrepancy.data.prepared_campaign import prepare, shot_set, split_held_out
 from impactcell.discrepancy.model.initial_guess import fit_nominal
@@ -77,11 +78,16 @@ def subset(plan: list[Job], found: list[Row]) -> list[Task]:
 def run(task: Task) -> Row:
     """Answers of the rivals on one campaign."""
     job = task.job
-    prepared = prepare(campaign(job, task.multiples))
-    floor = noise_floor.sensor_noise(prepared)
-    training, _ = split_held_out(prepared, job.seed)
     library = tuple(effect for effect in LIBRARY if effect != job.removed)
-    row: Row = {"key": job.key}
+    return {"key": job.key} | answers(campaign(job, task.multiples), job.seed, library)
+
+
+def answers(given: Campaign, seed: int, library: tuple[str, ...]) -> Row:
+    """Say what each rival names, those that it cannot tell apart together, and how long it took."""
+    prepared = prepare(given)
+    floor = noise_floor.sensor_noise(prepared)
+    training, _ = split_held_out(prepared, seed)
+    row: Row = {}
     started = time.process_time()
     problem = Problem(shot_set(prepared, training, floor.noise_std), len(prepared.batches))
     nominal = fit_nominal(problem)
