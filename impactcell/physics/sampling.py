@@ -141,16 +141,30 @@ def update_peak_force(
 
 
 @compiled
+def samples_until(end_s: float, late_s: float, first: int, last: int, times: FloatPointer) -> int:
+    """Return the first of the samples `first` to `last` - 1, `late_s` early each, not before `end_s`."""
+    i = first
+    while i < last and times[i] - late_s < end_s:
+        i += 1
+    return i
+
+
+@compiled
 def fill_force(t: float, h: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord) -> None:
     """Fill the samples of the force channel that fall into [t, t + h), as the sensor shows them."""
-    index, times = record.sample_index, record.sample_times
+    index, times, samples = record.sample_index, record.sample_times, record.samples
     delay = phase.cache[at.DELAY_S]
-    i = index[at.FORCE]
-    while i < index[at.CHANNEL_COUNT + at.FORCE] and times[i] - delay < t + h:
-        force = sensed_force((times[i] - delay - t) / h, t, h, phase, step)
-        record.samples[i] = sensor_reading(force, phase)
-        i += 1
-    index[at.FORCE] = i
+    first = index[at.FORCE]
+    end = samples_until(t + h, delay, first, index[at.CHANNEL_COUNT + at.FORCE], times)
+    if phase.contact_mode[at.ZONE] < at.NEAR and not phase.cache[at.LAG_S] > 0.0:
+        nothing = sensor_reading(0.0, phase)
+        for i in range(first, end):
+            samples[i] = nothing
+    else:
+        for i in range(first, end):
+            force = sensed_force((times[i] - delay - t) / h, t, h, phase, step)
+            samples[i] = sensor_reading(force, phase)
+    index[at.FORCE] = end
 
 
 @compiled
@@ -164,12 +178,12 @@ def fill_channel(
     record: TapRecord,
 ) -> None:
     """Fill the samples of a channel that is a component of the state, along +1, that fall into [t, t + h)."""
-    index, times = record.sample_index, record.sample_times
-    i = index[channel]
-    while i < index[at.CHANNEL_COUNT + channel] and times[i] < t + h:
-        record.samples[i] = sign * interpolate((times[i] - t) / h, interpolant, component)
-        i += 1
-    index[channel] = i
+    index, times, samples = record.sample_index, record.sample_times, record.samples
+    first = index[channel]
+    end = samples_until(t + h, 0.0, first, index[at.CHANNEL_COUNT + channel], times)
+    for i in range(first, end):  # known before, so that several samples are worked out side by side
+        samples[i] = sign * interpolate((times[i] - t) / h, interpolant, component)
+    index[channel] = end
 
 
 @compiled
