@@ -6,9 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from impactcell.discrepancy.data import prepare, sensor_noise, split_held_out
+from impactcell.discrepancy.laws import estimate_effects
 from impactcell.discrepancy.model import Fit, Problem, fit, join_intervals, linearise, profile_parameters
 from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.intervals import ParameterEstimate, estimate_parameters
+from impactcell.discrepancy.nominal_model import problem_of
 from tests.discrepancy import study
 from tests.discrepancy.test_convergence import context_of, fitted
 
@@ -59,6 +62,27 @@ def test_a_range_that_is_all_there_is_becomes_what_the_data_allow(compliant: tup
     limit = 2.2**2
     beyond, within = (_at_ratio(problem, stuck, math.log(at)) for at in (1.1 * ratio.high, ratio.high))
     assert within.state.cost <= stuck.state.cost + limit < beyond.state.cost
+
+
+def test_beside_what_remains_they_hold_what_fits_as_well_further_from_a_bound() -> None:
+    """A force that no library has bends the stiffness by 23 %; beside its form mu_s/mu_k comes to 1."""
+    job = study.Job(
+        "model_error", ("presliding_compliance", "wandering_force"), 600_032, target=5.489, shots=40
+    )
+    multiples = (0.5, 0.0678)
+    prepared = prepare(study.campaign(job, multiples))
+    training, _ = split_held_out(prepared, job.seed)
+    problem = problem_of(prepared, sensor_noise(prepared), training)
+    context = replace(context_of("surface_tilt"), problem=problem, coarse=problem, prepared=prepared)
+    (truth,) = study.hidden(job, multiples)["presliding_compliance"].values()
+    nominal, problem = fit_nominal(problem), problem.with_effects(job.hidden[:1])
+    start = np.append(nominal.theta, problem.coordinates[-1].coordinate(truth))
+    model = fit(problem, start, nominal.shot_parameters, spread=nominal.spread)
+    alone = profile_parameters(problem, model, linearise(problem, model))
+    (beside,) = estimate_effects(context, context.test_model(model), alone)
+    assert abs(_of(beside.effect, alone).value / truth - 1.0) > 0.2
+    assert abs(beside.value / truth - 1.0) < 0.05
+    assert beside.low <= truth <= beside.high < 1.5 * truth
 
 
 def _of(effect: str, estimates: tuple[ParameterEstimate, ...]) -> ParameterEstimate:

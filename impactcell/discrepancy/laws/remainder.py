@@ -18,6 +18,7 @@ from impactcell.discrepancy.model import (
     Fit,
     ParameterEstimate,
     Problem,
+    fit,
     refit_shot_parameters,
 )
 from impactcell.discrepancy.search import (
@@ -68,6 +69,8 @@ def _beside_form(context: SearchContext, model: Fit) -> tuple[Problem, Fit] | No
     if span is None:
         return None
     try:
-        return fit_free_term(coarse, base, form, span, FIRST_TRY)
+        extended, few_steps = fit_free_term(coarse, base, form, span, FIRST_TRY)
+        # A few steps tell which form does best; parameters are those of the optimum.
+        return extended, fit(extended, few_steps.theta, few_steps.shot_parameters, spread=few_steps.spread)
     except DiscrepancyError:
         return None

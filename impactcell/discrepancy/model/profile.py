@@ -20,13 +20,18 @@ from impactcell.discrepancy.model.problem import Problem
 from impactcell.errors import DiscrepancyError
 from impactcell.physics import ParameterKind
 from impactcell.physics.effects import find_effect
+from impactcell.records import Samples
 
 HALVINGS = 5
 """Times that the way to the end of an interval is halved to find how far the data allow it."""
 
 
 def profile_parameters(
-    problem: Problem, model: Fit, linearisation: LinearisedFit, shared_error: SharedError | None = None
+    problem: Problem,
+    model: Fit,
+    linearisation: LinearisedFit,
+    shared_error: SharedError | None = None,
+    penalty: Samples | None = None,
 ) -> tuple[ParameterEstimate, ...]:
     """Every shared parameter; where an interval ends at a bound, the others hold for all that fits as well.
 
@@ -34,8 +39,9 @@ def profile_parameters(
     quantile of the intervals (profile likelihood; Venzon and Moolgavkar 1988); their intervals hold those of
     the optimum and of both ends. A coordinate whose interval is all its range is as uncertain as it moves.
     """
-    estimates = estimate_parameters(model, linearisation, shared_error)
-    limit = interval_quantile(model, linearisation) ** 2 * max(linearisation.mean_squared_residual, 1.0)
+    estimates = estimate_parameters(model, linearisation, shared_error, penalty)
+    quantile = interval_quantile(model, linearisation, penalty)
+    limit = quantile**2 * max(linearisation.mean_squared_residual, 1.0)
     joined = estimates
     for column, estimate in enumerate(estimates):
         if not estimate.at_bound or _is_angle(estimate):
@@ -44,7 +50,7 @@ def profile_parameters(
         ends = [coordinate.coordinate(end) for end in (estimate.low, estimate.high)]
         reached = [_furthest(problem, model, column, end, limit) for end in ends]
         for furthest in filter(None, reached):
-            there = estimate_parameters(furthest, linearise(problem, furthest), shared_error)
+            there = estimate_parameters(furthest, linearise(problem, furthest), shared_error, penalty)
             joined = join_intervals(joined, (*there[:column], *there[column + 1 :]))
         if any(reached) and sorted(ends) == [coordinate.lower, coordinate.upper]:
             values = sorted(coordinate.value(float((one or model).theta[column])) for one in reached)

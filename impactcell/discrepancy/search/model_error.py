@@ -18,8 +18,8 @@ from impactcell.discrepancy.model import (
     Problem,
     Scores,
     SharedError,
-    estimate_parameters,
     linearise,
+    profile_parameters,
     scores,
 )
 from impactcell.discrepancy.search.evidence import ModelEvidence
@@ -138,12 +138,15 @@ def shared_error_of(chart: MapDirections, chart_scores: Scores) -> SharedError:
 def estimate_beside_error(
     problem: Problem, model: Fit, prepared: PreparedCampaign
 ) -> tuple[ParameterEstimate, ...]:
-    """Every shared parameter of a model, its interval widened by the error that all shots share."""
+    """Every shared parameter of a model, its interval widened by the error that all shots share.
+
+    And by what else fits as well beside a coordinate that ends at a bound.
+    """
     linearisation = linearise(problem, model)
     chart = map_directions(problem, model, linearisation, prepared)
     shared = shared_error_of(chart, scores(linearisation, chart.products))
     penalty = problem.with_effects(model.effects).penalty_matrix
-    return estimate_parameters(model, linearisation, shared, penalty)
+    return profile_parameters(problem, model, linearisation, shared, penalty)
 
 
 def _channels_of(residual: Samples, channel: IndexArray) -> list[Samples]:
