@@ -280,8 +280,9 @@ class ModuleAcquisition:
         cycle = received.cycle_id.cycle
         if received.missed:
             are, them = ("is", "it") if received.missed == 1 else ("are", "them")
+            why = "was started anew, or had overwritten" if received.restarted else "had overwritten"
             self._log.warning(
-                "%d before it %s lost: the module had overwritten %s", received.missed, are, them, cycle=cycle
+                "%d before it %s lost: the module %s %s", received.missed, are, why, them, cycle=cycle
             )
         for fault in received.faults:
             self._log.warning("%s", fault.removeprefix(f"{self.cell}: cycle {cycle}: "), cycle=cycle)

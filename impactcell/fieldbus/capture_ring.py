@@ -31,8 +31,9 @@ class NextCapture:
         Cycles between the last one taken and this one, which the ring no longer has. After a restart it is
         what the module's counter says of those since, as far as that can be known: see `_made_before`.
     restarted : bool
-        Whether the module was started anew since the last one taken. How many cycles it made between that one
-        and the restart nobody knows; `missed` counts those of the new session.
+        Whether the module was started anew since the last one taken. `missed` counts what was seen of the
+        session before and not taken, and those of the new one; what else it made before the restart nobody
+        knows.
     """
 
     cycle_id: CycleId
@@ -66,7 +67,12 @@ def is_consistent(counter: int, ring: Sequence[int]) -> bool:
 
 
 def next_capture(
-    last: CycleId | None, session: int, counter: int, ring: Sequence[int], skip: int = 0
+    last: CycleId | None,
+    session: int,
+    counter: int,
+    ring: Sequence[int],
+    skip: int = 0,
+    seen: int | None = None,
 ) -> NextCapture | None:
     """Return the oldest cycle of the ring that comes after `last`, or None if there is nothing new.
 
@@ -80,6 +86,8 @@ def next_capture(
         Cycle held by each slot, 0 for an empty one.
     skip : int
         Leave out so many of the oldest, because they are overwritten faster than they are read.
+    seen : int, optional
+        Last complete cycle that the module was seen to have in the life of `last`.
     """
     if counter == 0 or last == CycleId(session, counter):
         return None
@@ -101,14 +109,16 @@ def next_capture(
         missed = 0
     elif restarted:
         complete = len(ages_to_read) == len(ring)
-        missed = max(0, _made_before(last.cycle, counter, len(ages_to_read), complete=complete) - age)
+        unread = 0 if seen is None else cycles_after(last.cycle, seen)
+        made = _made_before(last.cycle, counter, len(ages_to_read), unread, complete=complete)
+        missed = max(0, made - age)
     else:
         missed = max(0, behind - age - 1)
     return NextCapture(CycleId(session, ring[slot]), slot, counter, missed, restarted)
 
 
-def _made_before(last: int, counter: int, held: int, *, complete: bool) -> int:
-    """Return how many cycles before the newest were made since `last`, before which the module was restarted.
+def _made_before(last: int, counter: int, held: int, unread: int, *, complete: bool) -> int:
+    """Return how many cycles before the newest are known to have been made since `last`, over a restart.
 
     A module counts from 1 again, goes on counting where it was, or begins where somebody set its counter. A
     ring that is not full tells which: it holds all that was made since the restart. Where it is full, the
@@ -120,13 +130,15 @@ def _made_before(last: int, counter: int, held: int, *, complete: bool) -> int:
         Cycle taken last, and the newest.
     held : int
         How many the ring holds.
+    unread : int
+        How many were seen to be complete before the restart, after `last`.
     complete : bool
         Whether it is full.
     """
     if held == counter:  # from 1 again, and all are there
-        return counter - 1
+        return unread + counter - 1
     since = cycles_after(last, counter)
     went_on = held <= since <= CYCLE_PERIOD // 2  # a start empties the ring
     if complete and not (went_on and _FEWER * since < counter):
-        return counter - 1 if counter <= CYCLE_PERIOD // 2 else 0
-    return since - 1 if went_on else 0
+        return unread + (counter - 1 if counter <= CYCLE_PERIOD // 2 else 0)
+    return since - 1 if went_on else unread

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from impactcell.fieldbus.capture_ring import NextCapture, is_consistent, next_capture
+from impactcell.fieldbus.capture_ring import NextCapture, is_after, is_consistent, next_capture
 from impactcell.fieldbus.fetched_capture import NotFetched
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.fieldbus.status_block import StatusBlock
@@ -25,6 +25,7 @@ class CycleChoice:
         self._overwritten = self._disagreements = 0
         self._contradicted_since_s: float | None = None
         self._told = False
+        self._seen: CycleId | None = None
 
     def target(self, last: CycleId | None, status: StatusBlock, now_s: float) -> NextCapture | None:
         """Choose the cycle to read; None where there is none, or the status block contradicts itself."""
@@ -34,7 +35,11 @@ class CycleChoice:
             self._contradict(f"cycle_counter shows {status.cycle_counter}, but ring_cycle {shown}", now_s)
             return None
         skip = self._overwritten // 2 + self._disagreements // _DISAGREEMENTS
-        target = next_capture(last, status.session, status.cycle_counter, status.ring, skip)
+        newest = CycleId(status.session, status.cycle_counter)
+        if last is not None and newest.session == last.session and not is_after(last.cycle, newest.cycle):
+            self._seen = newest
+        seen = self._seen.cycle if self._seen and last and self._seen.session == last.session else None
+        target = next_capture(last, newest.session, newest.cycle, status.ring, skip, seen)
         if target is None:
             self._agree()
         return target

@@ -172,6 +172,28 @@ async def test_a_restart_of_the_module_is_told(fpga: RegisterMap) -> None:
         assert (module.status.restarts, module.status.reconnects) == (1, 1)
 
 
+class RebootsAtSamples(ScriptedDevice):
+    """Starts anew, with a cycle of its own, when the samples of one are read for the first time."""
+
+    rebooted = False
+
+    def read(self, table: str, address: int, count: int) -> Words:
+        if address >= self.registers["force"].address and not self.rebooted:
+            self.rebooted = True
+            self.start(session=5)
+            make(self)
+        return super().read(table, address, count)
+
+
+async def test_a_cycle_that_was_seen_and_not_taken_before_a_restart_is_missed(fpga: RegisterMap) -> None:
+    device = RebootsAtSamples(fpga, session=4)
+    make(device, 10)
+    async with running(fpga, device, after=CycleId(4, 9)) as (_, module, receptions):
+        (received,) = await take(receptions, 1)
+        assert (received.cycle_id, received.missed, received.restarted) == (CycleId(5, 1), 1, True)
+        assert module.status.missed == 1
+
+
 async def test_the_counter_wraps_without_loss(fpga: RegisterMap) -> None:
     device = ScriptedDevice(fpga, counter=CYCLE_PERIOD - 3)
     async with running(fpga, device, after=CycleId(1, CYCLE_PERIOD - 3)) as (_, module, receptions):

@@ -147,3 +147,19 @@ def test_skipping_leaves_out_the_oldest_and_counts_them() -> None:
     want = next_capture(CycleId(1, 12), 1, 20, ring_of(20, 1), skip=3)
     assert want is not None
     assert (want.cycle_id.cycle, want.missed) == (16, 3)
+
+
+def test_cycles_that_were_seen_before_a_restart_and_not_taken_are_missed() -> None:
+    """Of a module that counts from 1 again, with a ring or one buffer, and of one that goes on counting."""
+    want = next_capture(CycleId(1, 5000), 2, 3, ring_of(3, 1), seen=5004)
+    assert want is not None
+    assert (want.cycle_id, want.missed) == (CycleId(2, 1), 4)
+    want = next_capture(CycleId(1, 33), 2, 1, [1], seen=34)
+    assert want is not None
+    assert (want.cycle_id, want.missed) == (CycleId(2, 1), 1)
+    went_on = next_capture(CycleId(1, 65_527), 2, 65_531, ring_of(65_531, 65_531), seen=65_530)
+    assert went_on is not None
+    assert (went_on.cycle_id, went_on.missed) == (CycleId(2, 65_531), 3)
+    nothing_new = next_capture(CycleId(1, 5000), 2, 3, ring_of(3, 1), seen=5000)
+    assert nothing_new is not None
+    assert nothing_new.missed == 0
