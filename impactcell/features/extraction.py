@@ -1,5 +1,6 @@
 """Features of a capture, extracted once for all that use them."""
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ParamSpec, TypeVar
@@ -47,8 +48,8 @@ class Features:
     slide : SlideFeatures or Fault
         Distance, deceleration and time of rest of the free slide.
     segment : SlideSegment or Fault
-        Block means of the position from separation, or from the start of a record without force, to just
-        before rest.
+        Block means of the position from separation, or from the start of a record of a part that nothing
+        strikes, to just before rest.
     left_out : tuple of str
         What of the capture is in none of them, an offset of the force too.
     """
@@ -110,8 +111,8 @@ def required(feature: T | PredictionError | PhysicsError) -> T:
 def _segment(
     capture: Capture, position: CheckedChannel | Fault, separation: MeasuredFeature | Fault
 ) -> SlideSegment | Fault:
-    """Segment of the slide; a force that was recorded and does not tell the separation is a fault."""
-    if capture.force is None:
+    """Segment of the slide; of a tap whose force does not tell the separation, or is lost, there is none."""
+    if capture.force is None and math.isnan(capture.velocity_m_s):  # nothing strikes: all of it is the slide
         separation_s = None
     elif isinstance(separation, Fault):
         return separation

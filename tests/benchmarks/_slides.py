@@ -1,5 +1,6 @@
 """Free slides over a friction profile that is known exactly, integrated to 1e-10 apart from the product."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -43,5 +44,5 @@ def slide(
     t = np.arange(0.0, stop + rest_s, 1.0 / rate)
     x = np.where(t < stop, path.sol(np.minimum(t, stop))[0], path.y[0, -1])
     x = x + noise * np.random.default_rng([6, seed]).normal(size=len(t))
-    capture = Capture(seed, 0.05, 18.9, None, Channel(t, x, noise))
+    capture = Capture(seed, math.nan, 18.9, None, Channel(t, x, noise))
     return capture, float(path.y[0, -1])

@@ -253,3 +253,19 @@ def test_a_raster_in_decimals_is_no_silence() -> None:
     position = np.array([float(f"{place:.6f}") for place in 5e-6 * np.cumsum(steps)])
     assert np.median(np.abs(np.diff(position, 3))) < 1e-17
     assert 5e-7 < white_noise_std(position) < 5e-6
+
+
+def test_without_a_force_a_tap_has_no_segment_and_a_slide_that_nothing_strikes_is_one_itself() -> None:
+    """Samples of the force that were lost are no sign that the part slid from the start on."""
+    tap = replace(TAPS[0].capture(force_hz=1e5), force=None)
+    segment = extract(tap).segment
+    assert isinstance(segment, CaptureError)
+    assert str(segment) == "no force was recorded"
+    whole = extract(TAPS[0].capture(force_hz=1e5))
+    separation, position = required(whole.separation).value, tap.position
+    assert position is not None
+    slides = position.time_s > separation
+    alone = Channel(position.time_s[slides] - separation, position.values[slides], position.noise_std)
+    slide = extract(replace(tap, position=alone, velocity_m_s=math.nan))
+    distance = required(slide.segment).distance_m
+    assert distance[-1] == pytest.approx(required(whole.segment).distance_m[-1], rel=0.01)
