@@ -61,6 +61,24 @@ def test_contact_stays_where_it_is_said_to_be_if_that_is_not_what_is_wrong(
     assert [tap.capture.onset_std_s for tap in used] == pytest.approx([5e-6] * len(used))
 
 
+def test_noise_that_is_stated_a_little_low_makes_nothing_exact_that_was_told() -> None:
+    """Masses, velocities and scales count as known to some tenths of a per cent, and mu_k with them."""
+    taps, _ = triggered(0.0)
+
+    def stated_low(channel: Channel | None) -> Channel:
+        assert channel is not None
+        assert channel.noise_std is not None
+        return replace(channel, noise_std=0.96 * channel.noise_std)
+
+    low = [replace(tap, force=stated_low(tap.force), position=stated_low(tap.position)) for tap in taps]
+    right, as_told = fit_plant_and_onset([extract(tap) for tap in taps], 9.81)
+    fit, used = fit_plant_and_onset([extract(tap) for tap in low], 9.81)
+    assert right.gap < 1.01 < 1.03 < fit.gap
+    for tap, same in zip(used, as_told, strict=True):
+        expected = right.estimate(same, right.model).mu_k.std
+        assert fit.estimate(tap, fit.model).mu_k.std == pytest.approx(expected, rel=0.1)
+
+
 def test_no_trigger_is_called_late_where_that_does_not_explain_the_taps() -> None:
     """The part is damped by its speed, which no moment of contact makes up for."""
     damped = {"viscous_friction": {"viscous_coefficient_n_s_per_m": 85.0}}
