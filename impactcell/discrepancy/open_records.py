@@ -1,9 +1,15 @@
 """What a record tells of a shot is not exact: where it has to be open, and what is found beside that."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from impactcell.discrepancy.model import SETTINGS, Fit, implausible_notes, is_plausible, setting_scatter
+from impactcell.discrepancy.model import (
+    SETTINGS,
+    Fit,
+    dependence_notes,
+    implausible_notes,
+    setting_scatter,
+)
 from impactcell.discrepancy.nominal_model import NominalModel, NominalModels
 from impactcell.discrepancy.search import (
     SearchContext,
@@ -78,12 +84,22 @@ def find_basis(context: SearchContext, nominals: NominalModels, search: Search) 
     notes: tuple[str, ...] = ()
     for nominal, looks in _others(nominals, search):
         other = _beside(context, nominals, nominal, looks)
-        new = [name for name in SETTINGS if name in nominal.opened and name not in already]
-        if other.explains and is_plausible(other.best, new):
-            return other
-        if other.explains and not notes:
-            notes = implausible_notes(other.best, new)
+        if other.explains:
+            new = [name for name in nominal.opened if name not in already]
+            doubts = _doubts(other, new)
+            if not doubts:
+                return other
+            notes = notes or doubts
     return replace(basis, notes=notes)
+
+
+def _doubts(basis: Basis, opened: Sequence[str]) -> tuple[str, ...]:
+    """Say why what explains the shots is no error of their records: it is too much, or knows the shot."""
+    settings = [name for name in SETTINGS if name in opened]
+    return (
+        *implausible_notes(basis.best, settings),
+        *dependence_notes(basis.context.problem, basis.best, opened),
+    )
 
 
 def _beside(context: SearchContext, nominals: NominalModels, nominal: NominalModel, search: Search) -> Basis:

@@ -35,12 +35,12 @@ from impactcell.discrepancy.model.parameters import (
 from impactcell.discrepancy.model.phase_of_samples import phase_positions, sample_phases, trajectory_of
 from impactcell.discrepancy.model.problem import FitState, Problem, remove_jumps
 from impactcell.discrepancy.model.profile import join_intervals, profile_parameters
+from impactcell.discrepancy.model.setting_dependence import dependence_notes
 from impactcell.discrepancy.model.shot_fits import normal_equations
 from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
 from impactcell.discrepancy.model.told_settings import (
     SETTINGS,
     implausible_notes,
-    is_plausible,
     setting_notes,
     setting_scatter,
     settings_on_average,
@@ -67,6 +67,7 @@ __all__ = [
     "contact_note",
     "contact_scatter",
     "decided_blocks",
+    "dependence_notes",
     "direction_products",
     "effect_coordinates",
     "estimate_parameters",
@@ -75,7 +76,6 @@ __all__ = [
     "fit_nominal",
     "fit_split",
     "implausible_notes",
-    "is_plausible",
     "join_intervals",
     "linearise",
     "normal_equations",

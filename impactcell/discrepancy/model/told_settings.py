@@ -113,11 +113,6 @@ def setting_scatter(problem: Problem, fitted: Fit) -> dict[str, SettingScatter]:
     return found
 
 
-def is_plausible(fitted: Fit, names: Sequence[str] = SETTINGS) -> bool:
-    """Whether settings may have been told as they were."""
-    return all(_is_plausible(fitted, name) for name in names)
-
-
 def setting_notes(fitted: Fit, names: Sequence[str]) -> tuple[str, ...]:
     """Say of each of some settings by how much it is off."""
     return tuple(

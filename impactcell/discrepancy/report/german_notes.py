@@ -20,6 +20,12 @@ AT_REST: Final = {"before contact": "vor dem Kontakt", "after the tap": "nach de
 """When a part lies still."""
 SETTINGS: Final = {"velocity": "Die Geschwindigkeit", "mass": "Die Masse"}
 """What is told of a shot."""
+DOUBTED: Final = {
+    "first contact": "der erste Kontakt",
+    "velocity": "die Geschwindigkeit",
+    "mass": "die Masse",
+}
+"""What may be otherwise than a record has it."""
 LIKE: Final = {"velocity": "", "mass": "; eine Kraft mit falschem Maßstab sähe ebenso aus"}
 """What looks the same."""
 NOTES: Final[Patterns] = (
@@ -44,6 +50,11 @@ NOTES: Final[Patterns] = (
      r"from shot to shot, more than the (\S+ %) .*"),
      lambda m: f"{SETTINGS[m[1]]}: nichts bliebe übrig, wenn sie im Mittel um {m[2]}, von Stoß zu Stoß um "
      f"{m[3]} von der Angabe abwiche, mehr als die {m[4]}, die der Messung zugeschrieben werden: prüfen."),
+    ((r"Nothing would remain if (first contact|velocity|mass) .*, but so it goes with (\w+) "
+      r"\(correlation (\S+)\), .*"),
+     lambda m: f"Nichts bliebe übrig, wenn {DOUBTED[m[1]]} Stoß für Stoß anders wäre als angegeben; doch so "
+     f"hängt das mit der Größe „{phrase(m[2])}“ zusammen (Korrelation {m[3]}), und das tut kein Fehler einer "
+     "Aufnahme."),
     (r"The mass of shot (\d+) is not stated and is fitted, block by block\.",
      r"Die Masse zu Stoß \1 ist nicht angegeben und wird angepasst, Block für Block."),
     (r"(\d+) of (\d+) training blocks were left out: .*",

@@ -1,0 +1,64 @@
+"""What a shot's own numbers go with: an error of a record does not know which way or how hard was tapped."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import stats
+
+from impactcell.discrepancy.model.contact_moment import MIN_STEP_SHARE
+from impactcell.discrepancy.model.least_squares import Fit
+from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.model.shot_parameters import STD_OF_TOLD
+from impactcell.records import Samples
+
+CHANCE = 1e-3
+"""Chance of the closest correlation with any covariate below which a number goes with it."""
+LEAST_SHARE = 0.1
+"""Of the error with which a setting is known: less than this that goes with a covariate does not matter."""
+_WORDS = {
+    "onset_s": "first contact lay elsewhere than told",
+    "log_velocity": "velocity were off what is told",
+    "log_mass": "mass were off what is told",
+}
+
+
+def dependence_notes(problem: Problem, fitted: Fit, names: Sequence[str]) -> tuple[str, ...]:
+    """Say which of the shots' own numbers, by names, go with something that differs among the shots.
+
+    The correlation r of n shots is tested by t = r sqrt((n - 2) / (1 - r²)) (Student), the chance shared
+    among the covariates.
+    """
+    notes = []
+    for name in (name for name in names if name in _WORDS):
+        found = _closest(problem, getattr(fitted.shot_parameters, name), _least(problem, name))
+        if found is not None:
+            covariate, r = found
+            notes.append(
+                f"Nothing would remain if {_WORDS[name]}, shot by shot, but so it goes with {covariate} "
+                f"(correlation {r:+.2f}), which no error of a record does."
+            )
+    return tuple(notes)
+
+
+def _least(problem: Problem, name: str) -> float:
+    """Return the standard deviation along a covariate from which on it matters."""
+    if name in STD_OF_TOLD:
+        return LEAST_SHARE * STD_OF_TOLD[name]
+    return MIN_STEP_SHARE * float(np.median(problem.onset_step_s))
+
+
+def _closest(problem: Problem, values: Samples, least: float) -> tuple[str, float] | None:
+    """Return the covariate with the closest correlation and that, where it is no chance and matters."""
+    items, count = problem.shots.items, len(values)
+    if count < 4 or not float(values.std()) > least:
+        return None
+    found: list[tuple[float, str]] = []
+    for name in items[0].covariates:
+        row = np.array([shot.covariates.get(name, math.nan) for shot in items])
+        if np.isfinite(row).all() and float(np.ptp(row)) > 0.0:
+            found.append((float(np.corrcoef(row, values)[0, 1]), name))
+    r, name = max(found, key=lambda one: abs(one[0]), default=(0.0, ""))
+    t = abs(r) * math.sqrt((count - 2) / max(1.0 - r * r, 1e-15))
+    is_chance = len(found) * 2.0 * float(stats.t.sf(t, count - 2)) > CHANCE
+    return None if is_chance or abs(r) * float(values.std()) < least else (name, r)
