@@ -94,6 +94,7 @@ def update(
     updated = batch_filter.update_bank(settings, state, cycle)
     if state.commissioning is None and timing.lag == 0:
         state, cycle, updated, raised = process_noise.compare_models(settings, state, cycle, updated)
+        state = _with_past_seen_anew(state, updated) if raised else state
         notes.extend(raised)
     state, updated, raised = rate_change_detection.detect_rate_change(settings, state, cycle, updated, clock)
     notes.extend(raised)
@@ -236,6 +237,17 @@ def _update_filter(
     elif is_bent:
         current = wear_filter.restart_at_rate(current, *run_length_bank.moments(updated.bank))
     return state, current, change, innovation
+
+
+def _with_past_seen_anew(state: TrackerState, updated: BankUpdate) -> TrackerState:
+    """Let the filter follow a bank that sees all cycles anew: a change that was found in them may be none.
+
+    Only while one batch id has been seen: the bank knows nothing of how others compare.
+    """
+    if state.filter is None or not state.tested or state.batch_count > 1:
+        return state
+    again = wear_filter.restart_after_change(state.filter, *run_length_bank.moments(updated.bank))
+    return replace(state, filter=again)
 
 
 def _is_one_of_first(state: TrackerState, cycle: UsableCycle, current: WearFilter) -> bool:

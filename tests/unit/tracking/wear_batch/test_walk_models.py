@@ -161,6 +161,18 @@ def bank_of(values, variance):
     return bank, count, total
 
 
+def test_a_change_that_is_taken_back_leaves_no_offset_in_the_level_of_a_known_batch():
+    """Wear that accelerates has some until its slope is seen to walk: 5 and 8 deviations were left."""
+    cycles = np.arange(1, 801)
+    for seed in (2, 4):
+        level = 0.2 + 0.02 * (cycles / 800.0) ** 2
+        found = impactcell.track(
+            cycles, level + UNIT * white(40 + seed, 800), np.full(800, UNIT), batch=["A"] * 800
+        )
+        assert any(alarm.alarm == "BatchShift" for alarm in found.alarms)
+        assert abs(found.wear.level - level[-1]) < 2.0 * found.wear.level_std
+
+
 def test_a_change_is_weighed_under_both_scatters_by_how_probable_they_are():
     values = np.append(white(9, 13), 2.5 * white(10, walk_models.TOGETHER - 12))
     models, statistic = walk_models.begin(first_bank(values[0]), (0.0, 0.0), (0.0, 0.0), 1.0), None
