@@ -109,7 +109,7 @@ def _as_json(series: TrackedSeries) -> dict[str, object]:
                 "change_cycle": r.evidence.change_cycle,
                 "size": r.evidence.size,
                 "size_std": r.evidence.size_std,
-                "statistic": r.evidence.statistic,
+                "statistic": _finite(r.evidence.statistic),
                 "threshold": r.evidence.threshold,
                 "false_alarm_cycles": _finite(r.evidence.false_alarm_cycles),
             }

@@ -24,6 +24,9 @@ from impactcell.tracking.wear_batch.wear_report import WearMoments
 
 SECONDS_A_DAY = 86_400.0
 """Seconds."""
+LARGEST_STATISTIC = 1000.0
+"""Nats; more is told as this, the infinity of a change beside which that there was none is given up too: how
+certain it is beyond cannot be told, and what is told has to be a number for JSON and those who draw it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +176,7 @@ def _bank_moments(bank: Samples) -> tuple[WearMoments, float, float]:
 
 def _evidence(settings: TrackerSettings, state: TrackerState, change: ChangePoint) -> Evidence:
     return Evidence(
-        change.statistic,
+        min(change.statistic, LARGEST_STATISTIC),
         change.threshold,
         state.clock.number(change.cycle),
         change.size,

@@ -11,6 +11,7 @@ import impactcell
 from impactcell.cli.app import app
 from impactcell.cli.track import track
 from impactcell.errors import SeriesError
+from impactcell.tracking.wear_batch.state_reports import LARGEST_STATISTIC
 
 STD = 0.002
 
@@ -25,9 +26,13 @@ def write(path, mu_s, std=STD, batch=None, cycles=None):
     return path
 
 
+def refused(constant):
+    raise ValueError(f"JSON has no {constant}")
+
+
 def run(capsys, *args, **kwargs):
     track(*args, as_json=True, **kwargs)
-    return json.loads(capsys.readouterr().out)
+    return json.loads(capsys.readouterr().out, parse_constant=refused)
 
 
 def truth(n=1500, slope=2e-6, step=0.006, at=900, seed=1):
@@ -81,6 +86,14 @@ def test_the_wear_limit(tmp_path, capsys):
         f"WearLimit at cycle {worn['cycle']}: passed at about {worn['change_cycle']}, "
         f"level {worn['size']:.5f} ± {2.0 * worn['size_std']:.5f} above the limit"
     )
+
+
+def test_a_change_beyond_all_doubt_is_told_in_numbers(tmp_path, capsys):
+    """That there was none is given up within a cycle: the evidence is infinite, which is no JSON."""
+    mu_s = 0.2 + 0.1 * (np.arange(70) >= 50) + STD * np.random.default_rng(1).normal(size=70)
+    (shift,) = run(capsys, write(tmp_path / "s.csv", mu_s))["alarms"]
+    assert (shift["alarm"], shift["change_cycle"]) == ("BatchShift", 50)
+    assert shift["statistic"] == LARGEST_STATISTIC > shift["threshold"]
 
 
 def test_missing_stds_missing_cycles_and_missing_values(tmp_path, capsys):
