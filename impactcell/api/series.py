@@ -32,8 +32,8 @@ def track(
         Estimates and their standard deviations, one number for all or one each; nan, masked, or no standard
         deviations at all, where they are not known.
     batch : sequence of str or None, optional
-        Batch of each cycle, where it is known (None, nan or empty where not); without it changes of batch
-        are found in the series.
+        Batch of each cycle, where it is known (None, nan, the NA of pandas or empty where not); without it
+        changes of batch are found in the series.
     limit : float, optional
         mu_s at which the surface is worn; without it there is no alarm of wear.
 
@@ -45,7 +45,7 @@ def track(
     ------
     SeriesError
         Series of different lengths, without cycles, or not in order; what is no number; a cycle that is not
-        a whole number from 0 on; a limit that is not above 0.
+        a whole number from 0 on; batches that are none; a limit that is not one number above 0.
 
     Examples
     --------
@@ -60,14 +60,14 @@ def track(
     stds = _numbers("mu_s_std", math.nan if mu_s_std is None else mu_s_std)
     if mu_s_std is None or np.ndim(mu_s_std) == 0:
         stds = np.broadcast_to(stds, values.shape)
-    batches = [None] * len(cycles) if batch is None else [_batch_id(name) for name in batch]
+    batches = [None] * len(cycles) if batch is None else _batch_ids(batch)
     sizes = [cycles.shape, values.shape, stds.shape, (len(batches),)]
     if len(set(sizes)) != 1 or cycles.ndim != 1:
         raise SeriesError(f"cycle, mu_s, mu_s_std and batch must be of one length, not of shapes {sizes}")
     for place, number in enumerate(cycles):
         if fault := whole_number_fault(number):
             raise SeriesError(f"cycle[{place}] = {number:g} {fault}")
-    worn = math.inf if limit is None else float(_numbers("limit", limit).item(0))
+    worn = math.inf if limit is None else _one_number("limit", limit)
     if not worn > 0.0:
         raise SeriesError(f"limit = {worn:g}: give the mu_s at which the surface is worn, or leave it out")
     if LARGEST_FRICTION < worn < math.inf:
@@ -91,6 +91,33 @@ def _numbers(name: str, given: ArrayLike) -> Samples:
         raise SeriesError(f"{name} is to hold numbers: {error}") from error
 
 
-def _batch_id(given: object) -> str | None:
-    """Give the name of a batch; None, an empty one and nan, as tables have it, say that there is none."""
-    return None if given is None or given == "" or given != given else str(given)
+def _one_number(name: str, given: ArrayLike) -> float:
+    numbers = _numbers(name, given)
+    if numbers.size != 1:
+        raise SeriesError(f"{name} is to be one number, not {numbers.size}")
+    return float(numbers.item())
+
+
+def _batch_ids(given: Sequence[object]) -> list[str | None]:
+    try:
+        names = list(given)
+    except TypeError as error:
+        raise SeriesError(
+            f"batch = {given!r}: give a batch for each cycle, ['A', 'A', 'B'] say, or leave it out"
+        ) from error
+    return [_batch_id(place, name) for place, name in enumerate(names)]
+
+
+def _batch_id(place: int, given: object) -> str | None:
+    """Give the name of a batch; None, an empty one, nan and NA, as tables have it, say that there is none."""
+    if given is None or given is np.ma.masked:
+        return None
+    if isinstance(given, str):
+        return str(given) or None
+    try:
+        is_itself = bool(given == given)
+    except TypeError:
+        return None  # the NA of pandas: whether it is itself it does not say
+    except ValueError as error:
+        raise SeriesError(f"batch[{place}] is to be the name of one batch, not {given!r}") from error
+    return str(given) if is_itself else None

@@ -9,7 +9,7 @@ from pathlib import Path
 from impactcell.cell.series_replay import whole_number_fault
 from impactcell.errors import MeasurementError, SeriesError
 from impactcell.measurements.dialect import Dialect, decode, detect, split_cells
-from impactcell.measurements.numbers import is_grouped, parse_number
+from impactcell.measurements.numbers import is_grouped, is_missing, parse_number
 from impactcell.measurements.text_layout import is_comment
 from impactcell.tracking.wear_batch import FrictionObservation
 
@@ -150,7 +150,8 @@ def _reading(cells: dict[str, str], decimal: str) -> tuple[FrictionObservation, 
     mu_s, fault_of_mu_s = _number("mu_s", cells["mu_s"], decimal)
     std, fault_of_std = _number("mu_s_std", cells.get("mu_s_std", ""), decimal)
     faults += [fault for fault in (fault_of_mu_s, fault_of_std) if fault]
-    return FrictionObservation(int(number), mu_s, std, batch_id=cells.get("batch") or None), faults
+    batch = cells.get("batch", "")
+    return FrictionObservation(int(number), mu_s, std, batch_id=None if is_missing(batch) else batch), faults
 
 
 def _number(name: str, cell: str, decimal: str) -> tuple[float, str]:

@@ -92,12 +92,42 @@ def test_what_a_masked_array_hides_is_missing() -> None:
     assert masked.wear.level == missing.wear.level
 
 
+class NA:
+    """As the NA of pandas: a comparison with it is neither true nor false."""
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __eq__(self, other: object) -> "NA":  # type: ignore[override]
+        return self
+
+    def __bool__(self) -> bool:
+        raise TypeError("boolean value of NA is ambiguous")
+
+
+@pytest.mark.parametrize(
+    ("batch", "message"),
+    [
+        (5, r"batch = 5: give a batch for each cycle, \['A', 'A', 'B'\] say, or leave it out"),
+        (np.array([["A", "B"], ["C", "D"]]), r"batch\[0\] is to be the name of one batch, not array"),
+    ],
+)
+def test_batches_that_are_none_are_refused(batch: object, message: str) -> None:
+    with pytest.raises(SeriesError, match=message):
+        impactcell.track([1, 2], [0.2, 0.2], batch=batch)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("limit", [[], [0.25, 0.3]])
+def test_a_limit_is_one_number(limit: list[float]) -> None:
+    with pytest.raises(SeriesError, match=f"limit is to be one number, not {len(limit)}$"):
+        impactcell.track([1, 2], [0.2, 0.2], limit=limit)  # type: ignore[arg-type]
+
+
 def test_batches_that_a_table_leaves_out_are_none() -> None:
     def tracked(*names: object) -> impactcell.TrackedSeries:
         batch = [name for name in names for _ in range(50)]
         return impactcell.track(np.arange(100), series(count=100), 0.002, batch=batch)
 
-    for absent in (math.nan, ""):
+    for absent in (math.nan, "", np.ma.masked, NA()):
         assert tracked(absent, absent).wear.level == tracked(None, None).wear.level
         assert tracked("A", absent).wear.level == tracked("A", None).wear.level
     assert tracked(1, 2).batch.batch_id == "2"

@@ -218,6 +218,14 @@ def test_shots_of_a_campaign_are_cycles(tmp_path, capsys):
         track(path)
 
 
+@pytest.mark.parametrize("word", ["NaN", "#N/A", "null", "-"])
+def test_a_batch_is_missing_by_the_words_by_which_a_number_is(tmp_path, capsys, word):
+    names = [name for name in ("A", "", "B") for _ in range(20)]
+    expected = run(capsys, write(tmp_path / "s.csv", truth(60, at=0), batch=names))
+    told = run(capsys, write(tmp_path / "s.csv", truth(60, at=0), batch=[name or word for name in names]))
+    assert told == expected
+
+
 def test_columns_that_are_not_read_are_told(tmp_path, capsys):
     path = write(tmp_path / "s.csv", truth(60, at=0))
     path.write_text(path.read_text().replace("mu_s_std", "mu_s_sd"))
