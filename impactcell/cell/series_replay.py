@@ -12,6 +12,7 @@ from impactcell.alarms import AlarmSettings, CycleInputs, Notification
 from impactcell.alarms.rules import batch_shift
 from impactcell.errors import SeriesError
 from impactcell.records import BatchState, Evidence, Samples, WearState
+from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.tracking import wear_batch
 from impactcell.tracking.wear_batch import (
     FrictionObservation,
@@ -48,6 +49,12 @@ class RaisedAlarm:
     cycle: int
     evidence: Evidence
 
+    @property
+    def withdrawn(self) -> bool:
+        """Whether a batch shift, as the cycles after it came to see it, may as well be none (95 %)."""
+        evidence = self.evidence
+        return self.alarm == batch_shift.NAME and abs(evidence.size) <= TOLD_STDS * evidence.size_std
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedSeries:
@@ -59,6 +66,9 @@ class TrackedSeries:
         Level, rate per cycle and cycles left, after the last cycle.
     batch : BatchState
         Offset of the present batch and the last shift found, after the last cycle.
+    friction, friction_std : float
+        mu_s of the present batch, level and offset together, after the last cycle, and its standard
+        deviation.
     alarms : tuple of RaisedAlarm
         In the order in which they were raised.
     cycle, level, level_std, batch_offset : ndarray, shape (cycles,)
@@ -74,6 +84,8 @@ class TrackedSeries:
 
     wear: WearState
     batch: BatchState
+    friction: float
+    friction_std: float
     alarms: tuple[RaisedAlarm, ...]
     cycle: Samples
     level: Samples
@@ -144,9 +156,12 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
     if result is None:
         raise SeriesError("the series has no cycles")
     cycle, level, level_std, batch_offset, *cycles_to_limit = np.array(course).T
+    friction, friction_std = wear_batch.present_friction(settings, state, observations[-1])
     return TrackedSeries(
         wear=result.wear,
         batch=result.batch,
+        friction=friction,
+        friction_std=friction_std,
         alarms=tuple(raised),
         cycle=cycle,
         level=level,

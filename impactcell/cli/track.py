@@ -99,6 +99,8 @@ def _as_json(series: TrackedSeries) -> dict[str, object]:
         "level_std": wear.level_std,
         "batch_offset": batch.offset,
         "batch_offset_std": batch.offset_std,
+        "friction": series.friction,
+        "friction_std": series.friction_std,
         "cycles_to_limit": _finite(wear.cycles_to_limit),
         "cycles_to_limit_low": _finite(wear.cycles_to_limit_low),
         "cycles_to_limit_high": _finite(wear.cycles_to_limit_high),
@@ -112,6 +114,7 @@ def _as_json(series: TrackedSeries) -> dict[str, object]:
                 "statistic": _finite(r.evidence.statistic),
                 "threshold": r.evidence.threshold,
                 "false_alarm_cycles": _finite(r.evidence.false_alarm_cycles),
+                "withdrawn": r.withdrawn,
             }
             for r in series.alarms
         ],
@@ -130,10 +133,12 @@ def _cycles(count: float) -> str:
 
 def _as_text(series: TrackedSeries) -> str:
     wear = series.wear
+    level = plus_minus(wear.level, wear.level_std, ".5f")
     rate = plus_minus(1e3 * wear.rate_per_cycle, 1e3 * wear.rate_std, "+.6f", ".6f")
     lines = [
         f"{series.used} cycles used",
-        f"level   {plus_minus(wear.level, wear.level_std, '.5f')} (95 %, as all ± below)",
+        f"level   {level} (95 %, as all ± below): mu_s with the first batch",
+        *_batch_lines(series),
         f"wear    {rate} per 1000 cycles",
     ]
     if math.isfinite(wear.limit):
@@ -145,11 +150,25 @@ def _as_text(series: TrackedSeries) -> str:
     return "\n".join([*lines, *_note_lines(series.notes)])
 
 
+def _batch_lines(series: TrackedSeries) -> list[str]:
+    """Say what mu_s is by now where that is not the level; nothing where the first batch is still there."""
+    batch = series.batch
+    if batch.offset == batch.offset_std == 0.0:
+        return []
+    offset = plus_minus(batch.offset, batch.offset_std, "+.5f", ".5f")
+    now = plus_minus(series.friction, series.friction_std, ".5f")
+    return [
+        f"batch   {offset}: the present one beside the first",
+        f"now     {now}: mu_s with the present batch",
+    ]
+
+
 def _alarm_line(raised: RaisedAlarm) -> str:
     evidence, begin = raised.evidence, f"{raised.alarm} at cycle {raised.cycle}: "
     if raised.alarm == batch_shift.NAME:
         size = plus_minus(evidence.size, evidence.size_std, "+.5f", ".5f")
-        return f"{begin}changed at {evidence.change_cycle}, {size}"
+        end = "; withdrawn, by the cycles since it may be no change" if raised.withdrawn else ""
+        return f"{begin}changed at {evidence.change_cycle}, {size}{end}"
     passed = f"passed at about {evidence.change_cycle}, " if raised.alarm == wear_limit.NAME else ""
     off = plus_minus(abs(evidence.size), evidence.size_std, ".5f")
     return f"{begin}{passed}level {off} {'above' if evidence.size > 0.0 else 'below'} the limit"

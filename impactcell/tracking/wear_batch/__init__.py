@@ -8,6 +8,7 @@ from impactcell.tracking.wear_batch.state import (
     initial_state,
     reset_wear_level,
 )
+from impactcell.tracking.wear_batch.state_reports import present_friction
 from impactcell.tracking.wear_batch.tracker import update
 
 __all__ = [
@@ -17,6 +18,7 @@ __all__ = [
     "TrackerState",
     "TrackingResult",
     "initial_state",
+    "present_friction",
     "reset_wear_level",
     "update",
 ]

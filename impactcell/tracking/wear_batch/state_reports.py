@@ -72,17 +72,11 @@ def tracking_result(
     notes = outcome.notes
     probability = None
     quality = Quality.GOOD if outcome.used and not notes else Quality.UNCERTAIN
-    if (
-        state.filter is not None
-        and settings.batch is BatchKnowledge.KNOWN
-        and observation.batch_id is not None
-    ):
+    if state.filter is not None and _is_known(settings, observation):
         moments, offset, offset_std = _filter_moments(state.filter)
     else:
         blocks, index = state.wear_blocks, state.clock.last
-        prior = _slope_prior(settings, state)
-        is_bent = len(state.rates) > 0 and rate_changes.has_rate_changed(state.bank, state.rates, prior)
-        bank = rate_changes.mixture(state.bank, state.rates, prior) if is_bent else state.bank
+        bank, is_bent = _believed_bank(settings, state)
         moments, offset, offset_std = _bank_moments(bank)
         if blocks is not None and len(blocks.slopes) and not is_bent:
             total = moments.level + offset
@@ -124,6 +118,30 @@ def tracking_result(
         outcome.used,
         tuple(notes),
     )
+
+
+def present_friction(
+    settings: TrackerSettings, state: TrackerState, observation: FrictionObservation
+) -> tuple[float, float]:
+    """Friction of the present batch after a cycle: level and offset together, and the standard deviation."""
+    if len(state.bank) == 0:
+        return math.nan, math.nan
+    if state.filter is not None and _is_known(settings, observation):
+        return wear_filter.friction(state.filter)
+    known = run_length_bank.wear_moments(_believed_bank(settings, state)[0])
+    return known.total, math.sqrt(max(known.total_variance, 0.0))
+
+
+def _is_known(settings: TrackerSettings, observation: FrictionObservation) -> bool:
+    """Whether somebody says, and is believed, of which batch a cycle is."""
+    return settings.batch is BatchKnowledge.KNOWN and observation.batch_id is not None
+
+
+def _believed_bank(settings: TrackerSettings, state: TrackerState) -> tuple[Samples, bool]:
+    """Give the hypotheses that are believed, and whether wear has another rate by them."""
+    prior = _slope_prior(settings, state)
+    is_bent = len(state.rates) > 0 and rate_changes.has_rate_changed(state.bank, state.rates, prior)
+    return rate_changes.mixture(state.bank, state.rates, prior) if is_bent else state.bank, is_bent
 
 
 def _at_horizon(settings: TrackerSettings, state: TrackerState, moments: WearMoments) -> tuple[float, float]:

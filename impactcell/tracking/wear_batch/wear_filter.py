@@ -158,6 +158,15 @@ def update(
     return WearFilter(state.batches, state.current, mean, symmetric), Innovation(innovation, std)
 
 
+def friction(state: WearFilter) -> tuple[float, float]:
+    """Friction of the present batch, its level and offset together, and its standard deviation."""
+    value, variance = float(state.mean[0]), float(state.covariance[0, 0])
+    if own := _offset_index(state.batches, state.current):
+        value += float(state.mean[own])
+        variance += float(state.covariance[own, own] + 2.0 * state.covariance[0, own])
+    return value, math.sqrt(max(variance, 0.0))
+
+
 def offset(state: WearFilter, batch: str) -> tuple[float, float]:
     """Offset of a batch from the reference batch, and its standard deviation."""
     return contrast(state, batch, state.batches[0])

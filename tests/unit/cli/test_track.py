@@ -111,6 +111,34 @@ def test_missing_stds_missing_cycles_and_missing_values(tmp_path, capsys):
     assert found["notes"] == [{"cycle": int(kept[49]), "note": "mu_s is missing, the cycle is not used"}]
 
 
+def test_the_text_says_what_friction_is_by_now(tmp_path, capsys):
+    """The level is that of the first batch, which after a shift nobody measures any more."""
+    path = write(tmp_path / "s.csv", truth())
+    data = run(capsys, path)
+    track(path)
+    level, batch, now = capsys.readouterr().out.splitlines()[1:4]
+    assert level.endswith(": mu_s with the first batch")
+    assert batch.startswith(f"batch   {data['batch_offset']:+.5f} ± {2.0 * data['batch_offset_std']:.5f}: ")
+    assert (
+        now
+        == f"now     {data['friction']:.5f} ± {2.0 * data['friction_std']:.5f}: mu_s with the present batch"
+    )
+    assert abs(data["friction"] - 0.209) < 3.0 * data["friction_std"]
+    assert [alarm["withdrawn"] for alarm in data["alarms"]] == [False]
+    # with the first batch there is no other
+    track(write(tmp_path / "s.csv", truth(60, at=0), batch=["A"] * 60))
+    assert "now" not in capsys.readouterr().out
+
+
+def test_a_shift_that_was_taken_back_is_told_so(tmp_path, capsys):
+    noise = np.random.default_rng(12003).normal(0.0, 0.002, 800)
+    path = write(tmp_path / "s.csv", 0.2 + 0.002 * (np.arange(800) // 100 % 2) + noise, cycles=range(1, 801))
+    track(path)
+    shifts = [line for line in capsys.readouterr().out.splitlines() if line.startswith("BatchShift")]
+    withdrawn = [line.endswith("; withdrawn, by the cycles since it may be no change") for line in shifts]
+    assert withdrawn == [False, False, False, True]
+
+
 @pytest.mark.parametrize("n", [3, 24, 40])
 def test_a_few_dozen_cycles(tmp_path, capsys, n):
     mu_s = 0.2 + STD * np.random.default_rng(n).normal(size=n)
