@@ -10,6 +10,7 @@ import numpy as np
 from impactcell import alarms
 from impactcell.alarms import AlarmSettings, CycleInputs, Notification
 from impactcell.alarms.rules import batch_shift
+from impactcell.cell import series_runs
 from impactcell.errors import SeriesError
 from impactcell.records import BatchState, Evidence, Samples, WearState
 from impactcell.records.uncertainty import TOLD_STDS
@@ -102,7 +103,8 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
     Raises
     ------
     SeriesError
-        The series has no cycles, or they are not in the order in which they were measured.
+        The series has no cycles, or they are not in the order in which they were measured; cycles come again,
+        some with the same value and some with another.
     """
     cycles = [observation.cycle for observation in observations]
     falls = sum(after < before for before, after in pairwise(cycles))
@@ -117,7 +119,7 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
     notes: list[tuple[int, str]] = []
     result: TrackingResult | None = None
     used, open_shift = 0, -1
-    for observation in observations:
+    for observation in series_runs.told_apart(observations, settings.reorder_limit):
         result = wear_batch.update(settings, state, observation)
         state = result.state
         used += result.used

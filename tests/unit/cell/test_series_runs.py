@@ -1,0 +1,96 @@
+"""Cycles that come again in a series: another run of the counter, a copy, or what nobody can tell."""
+
+import math
+
+import numpy as np
+import pytest
+
+from impactcell.cell.series_replay import replay
+from impactcell.cell.series_runs import told_apart
+from impactcell.errors import SeriesError
+from impactcell.tracking.wear_batch import FrictionObservation, TrackerSettings
+
+LIMIT = TrackerSettings().reorder_limit
+
+
+def rows(*runs: list[int], seed: int = 6, digits: int = 6) -> list[FrictionObservation]:
+    """Give each cycle a value of its own."""
+    cycles = [cycle for run in runs for cycle in run]
+    values = np.random.default_rng(seed).normal(0.2, 0.002, len(cycles)).round(digits).tolist()
+    return [FrictionObservation(cycle, mu_s, 0.002) for cycle, mu_s in zip(cycles, values, strict=True)]
+
+
+def sessions(observations: list[FrictionObservation]) -> list[int]:
+    return [observation.session for observation in told_apart(observations, LIMIT)]
+
+
+def counted(last: int, first: int = 1) -> list[int]:
+    return list(range(first, last + 1))
+
+
+@pytest.mark.parametrize(
+    "runs",
+    [
+        (counted(60), counted(60)),
+        (counted(60), counted(20), counted(60)),
+        (counted(5), counted(60)),
+        (counted(60), counted(70, first=50)),
+        (counted(60), [1, 2, 4, 3, *counted(60, first=5)]),
+        (list(range(10, 610, 10)), list(range(10, 610, 10))),
+        (counted(60)[::2], counted(60)),
+    ],
+)
+def test_cycles_that_come_again_with_other_values_are_another_run(runs: tuple[list[int], ...]) -> None:
+    series = rows(*runs)
+    assert sessions(series) == [number for number, run in enumerate(runs, 1) for _ in run]
+    tracked = replay(TrackerSettings(), series)
+    assert tracked.used == len(series)
+    restarts = [note for _, note in tracked.notes if "restarted" in note]
+    assert restarts == [f"cycle numbers restarted at {run[0]}" for run in runs[1:]]
+
+
+def test_values_that_are_alike_by_rounding_are_another_run_still() -> None:
+    series = rows(counted(60), counted(60), digits=3)
+    assert sum(a.mu_s == b.mu_s for a, b in zip(series[:60], series[60:], strict=True)) > 3
+    assert replay(TrackerSettings(), series).used == 120
+
+
+@pytest.mark.parametrize(
+    "series",
+    [
+        rows(counted(60)),
+        rows(counted(60)) * 2,
+        rows(counted(60)) + rows(counted(60))[40:],
+        rows(counted(60), [59, 60]),
+        rows(counted(20), counted(40, first=25), counted(24, first=21)),
+        [one for one in rows(counted(60)) for _ in "ab"],
+        [FrictionObservation(cycle, math.nan, 0.002) for cycle in counted(60)] * 2,
+        rows(counted(300), counted(300, first=1)[:2]),
+    ],
+)
+def test_copies_lone_repeats_and_late_cycles_are_no_run(series: list[FrictionObservation]) -> None:
+    assert told_apart(series, LIMIT) == series
+
+
+def test_what_is_neither_a_copy_nor_a_run_is_refused_with_the_way_out() -> None:
+    first = rows(counted(60))
+    again = first[:50] + rows(counted(60), seed=7)[50:]
+    told = (
+        r"cycles 1 to 60 come again, 10 of 60 with another value: leave out those that are copies, or, "
+        r"where they are another run, number them on from 61$"
+    )
+    with pytest.raises(SeriesError, match=told):
+        replay(TrackerSettings(), first + again)
+
+
+def test_who_has_said_which_session_it_is_is_believed() -> None:
+    series = [FrictionObservation(o.cycle, o.mu_s, 0.002, session=7) for o in rows(counted(60), counted(60))]
+    assert told_apart(series, LIMIT) == series
+    assert replay(TrackerSettings(), series).used == 60
+
+
+def test_a_late_cycle_of_a_run_is_late_still() -> None:
+    series = rows(counted(60), [1, 2, 3, 5, 4, *counted(60, first=6)])
+    tracked = replay(TrackerSettings(), series)
+    assert tracked.used == 120
+    assert "cycle 4 came 1 cycle late" in [note for _, note in tracked.notes]
