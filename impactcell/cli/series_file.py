@@ -25,6 +25,10 @@ SEPARATOR_LINE = "sep="
 """Begin of the line with which Excel says what separates cells."""
 MOST_FAULTS = 20
 """Faults told of one file."""
+DECIMAL_COMMAS = (
+    "rows of more cells: with decimal commas, separate cells by `;`, or put such numbers in quotes"
+)
+"""Told of a file that has commas between its cells, and may have them within."""
 INFINITE = frozenset(("inf", "infinity"))
 """Numbers without sign that are no measurement: the tracker says so."""
 
@@ -64,9 +68,10 @@ def read_series(path: Path) -> SeriesFile:
         raise SeriesError(f"{path}:1: empty; the first line is to be {FIRST_LINE}")
     delimiter, header = _header(f"{path}:{head + 1}", lines[head])
     _, decimal, _ = detect(lines[head + 1 :], Dialect(delimiter=delimiter))
-    readings, faults = [], []
+    readings, faults, is_longer = [], [], False
     for line, row in _rows(path, lines, head + 1, delimiter):
         cells, found = _cells(header, row)
+        is_longer |= bool(found) and len(row) > len(header)
         if not found:
             reading, found = _reading(cells, decimal)
             readings.append(reading)
@@ -74,6 +79,7 @@ def read_series(path: Path) -> SeriesFile:
     if faults:
         rest = len(faults) - MOST_FAULTS
         more = [f"{path}: and {rest} more faults"] if rest > 0 else []
+        more += [f"{path}: {DECIMAL_COMMAS}"] if is_longer and delimiter == "," else []
         raise SeriesError("\n".join([*faults[:MOST_FAULTS], *more]))
     if not readings:
         raise SeriesError(f"{path}:{head + 2}: no cycles after the header")
@@ -143,9 +149,9 @@ def _cells(header: Sequence[str], row: list[str]) -> tuple[dict[str, str], list[
 def _reading(cells: dict[str, str], decimal: str) -> tuple[FrictionObservation, list[str]]:
     faults = []
     number = parse_number(cells["cycle"], decimal)
-    fault = "is not a whole number from 0 on" if number is None else whole_number_fault(number)
+    fault = whole_number_fault(math.nan if number is None else number)
     if number is None or fault:
-        faults.append(f"cycle `{cells['cycle']}` {fault}")
+        faults.append(f"cycle `{cells['cycle']}` {fault}; number the rows, leave out what is no cycle")
         number = 0.0
     mu_s, fault_of_mu_s = _number("mu_s", cells["mu_s"], decimal)
     std, fault_of_std = _number("mu_s_std", cells.get("mu_s_std", ""), decimal)

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
 from impactcell.alarms.rules import batch_shift, wear_limit
 from impactcell.cell.series_replay import RaisedAlarm, TrackedSeries, replay
 from impactcell.cli.series_file import COLUMNS, SeriesFile, read_series
@@ -146,7 +148,7 @@ def _as_text(series: TrackedSeries) -> str:
             _cycles, (wear.cycles_to_limit, wear.cycles_to_limit_low, wear.cycles_to_limit_high)
         )
         lines.append(f"limit   {wear.limit:g}, cycles to it: {left}, 95 %: {low} .. {high}")
-    lines.extend(map(_alarm_line, series.alarms))
+    lines.extend(_alarm_line(raised, series) for raised in series.alarms)
     return "\n".join([*lines, *_note_lines(series.notes)])
 
 
@@ -163,15 +165,23 @@ def _batch_lines(series: TrackedSeries) -> list[str]:
     ]
 
 
-def _alarm_line(raised: RaisedAlarm) -> str:
+def _alarm_line(raised: RaisedAlarm, series: TrackedSeries) -> str:
     evidence, begin = raised.evidence, f"{raised.alarm} at cycle {raised.cycle}: "
     if raised.alarm == batch_shift.NAME:
         size = plus_minus(evidence.size, evidence.size_std, "+.5f", ".5f")
         end = "; withdrawn, by the cycles since it may be no change" if raised.withdrawn else ""
         return f"{begin}changed at {evidence.change_cycle}, {size}{end}"
-    passed = f"passed at about {evidence.change_cycle}, " if raised.alarm == wear_limit.NAME else ""
+    passed = _passed(raised, series) if raised.alarm == wear_limit.NAME else ""
     off = plus_minus(abs(evidence.size), evidence.size_std, ".5f")
     return f"{begin}{passed}level {off} {'above' if evidence.size > 0.0 else 'below'} the limit"
+
+
+def _passed(raised: RaisedAlarm, series: TrackedSeries) -> str:
+    """Say when the limit was passed, where a level that was not above it has been seen before."""
+    until = np.flatnonzero(series.cycle == raised.cycle)[-1] + 1
+    if not (series.level[:until] <= series.wear.limit).any():
+        return "passed before the first cycle, "
+    return f"passed at about {raised.evidence.change_cycle}, "
 
 
 def _note_lines(notes: Sequence[tuple[int, str]]) -> list[str]:

@@ -96,6 +96,14 @@ def test_a_change_beyond_all_doubt_is_told_in_numbers(tmp_path, capsys):
     assert shift["statistic"] == LARGEST_STATISTIC > shift["threshold"]
 
 
+def test_a_limit_that_was_passed_from_the_first_cycle_on_was_not_seen_to_be_passed(tmp_path, capsys):
+    path = write(tmp_path / "s.csv", truth(60, at=0))
+    track(path, limit=0.15)
+    (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("WearLimit")]
+    assert ": passed before the first cycle, level 0.05" in line
+    assert "about" not in line
+
+
 def test_missing_stds_missing_cycles_and_missing_values(tmp_path, capsys):
     rng = np.random.default_rng(2)
     kept = np.sort(rng.choice(600, 450, replace=False))
@@ -174,6 +182,10 @@ def test_a_limit_that_is_not_reached_is_told_in_words(tmp_path, capsys):
         ("cycle,mu_s,mu_s_std\n1,0.2,0.1\n2,0.2\n", ":3: 2 cells, but the header has 3"),
         ("cycle,mu_s,mu_s_std\n1.5,0.2,0.1\n", ":2: cycle `1.5` is not a whole number"),
         ("cycle,mu_s,mu_s_std\nx,0.2,0.1\n", ":2: cycle `x` is not a whole number"),
+        (
+            "cycle,mu_s,mu_s_std\n2024-01-01,0.2,0.1\n",
+            ":2: cycle `2024-01-01` is not a whole number from 0 on; number the rows, leave out what",
+        ),
         ("cycle,mu_s,mu_s_std\ninf,0.2,0.1\n", ":2: cycle `inf` is not a whole number"),
         ("cycle,mu_s,mu_s_std\n-,0.2,0.1\n", ":2: cycle `-` is not a whole number"),
         ("cycle,mu_s,mu_s_std\n1e300,0.2,0.1\n", ":2: cycle `1e300` is larger than"),
@@ -199,6 +211,25 @@ def test_faults_of_a_file(tmp_path, text, message):
         track(path)
     assert str(error.value).startswith(str(path))
     assert message in str(error.value)
+
+
+def test_decimal_commas_between_commas_are_told_with_the_way_out(tmp_path):
+    path = tmp_path / "s.csv"
+    path.write_text("cycle,mu_s,mu_s_std\n" + "1,0,2,0,002\n" * 30)
+    with pytest.raises(SeriesError) as error:
+        track(path)
+    *_, last, more, way_out = str(error.value).splitlines()
+    assert last == f"{path}:21: 5 cells, but the header has 3"
+    assert more == f"{path}: and 10 more faults"
+    assert way_out == (
+        f"{path}: rows of more cells: with decimal commas, separate cells by `;`, or put such numbers "
+        "in quotes"
+    )
+    # other separators, and rows that are too short, have nothing to do with it
+    for text in ("cycle;mu_s\n1;0,2;3\n", "cycle,mu_s,mu_s_std\n1,0.2\n"):
+        path.write_text(text)
+        with pytest.raises(SeriesError, match=r"cells, but the header has \d$"):
+            track(path)
 
 
 def test_every_fault_of_a_file_is_told_at_once(tmp_path):
