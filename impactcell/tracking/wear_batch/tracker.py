@@ -60,7 +60,10 @@ def update(
     if not (is_unusable or timing.repeated):
         identical = noise_scale.identical_run(noise, observation.mu_s)
         if identical >= settings.identical_limit:
-            notes.append(f"mu_s has been the same {identical} times in a row, not used")
+            notes.append(
+                f"mu_s has been the same {identical} times in a row, not used: a sensor is stuck, or values "
+                "are rounded coarser than they scatter and need more decimals"
+            )
             noise, is_unusable = replace(noise, identical=identical), True
     bend = state.rate_change
     if timing.lag > 0 and bend is not None and timing.index < bend.cycle:

@@ -32,6 +32,10 @@ GERMAN: Final = {
         r"beiden ist falsch, oder das Modell",
     r"mu_s has been the same (\d+) times in a row, not used":
         r"µs war \1-mal hintereinander gleich, nicht verwendet",
+    r"mu_s has been the same (\d+) times in a row, not used: a sensor is stuck, or values are rounded "
+    r"coarser than they scatter and need more decimals":
+        r"µs war \1-mal hintereinander gleich, nicht verwendet: ein Sensor hängt, oder die Werte sind gröber "
+        r"gerundet, als sie streuen, und brauchen mehr Nachkommastellen",
     r"mu_s is missing, the cycle is not used": "µs fehlt, der Zyklus wird nicht verwendet",
     r"mu_s is infinite, the cycle is not used": "µs ist unendlich, der Zyklus wird nicht verwendet",
     r"mu_s = (\S+) is outside (\S+) \.\. (\S+), the cycle is not used":

@@ -312,6 +312,15 @@ def test_notes_that_are_alike_are_one_line(tmp_path, capsys):
     assert line.endswith("(and 59 more like this, the first at cycle 0)")
 
 
+def test_values_that_are_rounded_too_coarsely_are_told_what_they_need(tmp_path, capsys):
+    """They look like a stuck sensor, and are left out as its values are."""
+    found = run(capsys, write(tmp_path / "s.csv", truth(60, at=0).round(2)))
+    assert found["cycles"] < 60
+    notes = {note["note"].partition(" in a row, ")[2] for note in found["notes"]}
+    told = "or values are rounded coarser than they scatter and need more decimals"
+    assert notes == {f"not used: a sensor is stuck, {told}"}
+
+
 def test_of_several_rates_the_one_in_force_is_shown(tmp_path, capsys):
     """A surface that runs in: its first change of rate says nothing of what it does now."""
     cycles = np.arange(800)

@@ -12,7 +12,7 @@ import pytest
 import impactcell
 from impactcell.measurements import ColumnMeaning, guess, make_campaign, read_tables
 from impactcell.prediction.equations import beyond_calibration
-from impactcell.tracking.wear_batch import initial_state
+from impactcell.tracking.wear_batch import FrictionObservation, TrackerSettings, initial_state, update
 from impactcell.tracking.wear_batch.batch_change_detection import reason_not_ready
 from impactcell.tracking.wear_batch.input_validation import CycleClock, update_clock, validate_estimate
 from impactcell.web.cell_view import CellView
@@ -87,10 +87,26 @@ def test_what_the_tracker_says_of_a_cycle_is_said_in_german() -> None:
         clock, timing = update_clock(clock, cycle, (1000 + cycle) * 10**9, 64)
         notes += timing.note.split("; ") if timing.note else []
     notes.append(reason_not_ready(initial_state()))
-    assert len(notes) == 13
+    result = None
+    for cycle in range(1, 7):
+        state = initial_state() if result is None else result.state
+        result = update(TrackerSettings(), state, FrictionObservation(cycle, 0.2, 0.002))
+    assert result is not None
+    notes += result.notes
+    assert notes[-1].startswith("mu_s has been the same 6 times in a row, not used: ")
+    assert len(notes) == 14
     for note in notes:
         assert german_reason(note) != note
-        assert not words(german_reason(note)) & {*ENGLISH, "cycle", "cycles", "came", "used", "mu_s", "clock"}
+        assert not words(german_reason(note)) & {
+            *ENGLISH,
+            "cycle",
+            "cycles",
+            "came",
+            "used",
+            "mu_s",
+            "clock",
+            "stuck",
+        }
 
 
 def test_a_card_has_both_languages() -> None:
