@@ -7,6 +7,7 @@ from impactcell.german.patterns import behind_names
 from impactcell.german.system_errors import german_system_error
 
 AS_IT_IS: Final = "sie bleibt, wie sie ist"
+ANOTHER: Final = "eine andere Datei angeben"
 IN_USE: Final = (
     "während das Journal in Gebrauch war; was es bis dahin enthielt, ist verloren, wenn es nicht "
     "zurückgelegt wird; an seiner Stelle wird ein neues begonnen"
@@ -44,19 +45,20 @@ GERMAN: Final = {
         "ist beschädigt und nicht verwendbar (ihr Text ist kein UTF-8)",
     r"is damaged and cannot be used \((?P<system>.+)\)": r"ist beschädigt und nicht verwendbar (\g<system>)",
     r"cannot be used \((?P<system>.+)\); name another file":
-        r"nicht verwendbar (\g<system>); eine andere Datei angeben",
+        rf"nicht verwendbar (\g<system>); {ANOTHER}",
     r"cannot be used \((?P<system>.+)\)": r"nicht verwendbar (\g<system>)",
     r"cycle (?P<cycle>\d+) is stored already": r"Zyklus \g<cycle> ist schon gespeichert",
     # it is another's
-    r"not a journal \((?P<system>.+)\); it is left as it is": rf"kein Journal (\g<system>); {AS_IT_IS}",
-    r"not a journal, not even a database; it is left as it is":
-        f"kein Journal, nicht einmal eine Datenbank; {AS_IT_IS}",
-    r"a database, but no journal of impactcell; it is left as it is":
-        f"eine Datenbank, aber kein Journal von impactcell; {AS_IT_IS}",
+    r"not a journal \((?P<system>.+)\); it is left as it is; name another file":
+        rf"kein Journal (\g<system>); {AS_IT_IS}; {ANOTHER}",
+    r"not a journal, not even a database; it is left as it is; name another file":
+        f"kein Journal, nicht einmal eine Datenbank; {AS_IT_IS}; {ANOTHER}",
+    r"a database, but no journal of impactcell; it is left as it is; name another file":
+        f"eine Datenbank, aber kein Journal von impactcell; {AS_IT_IS}; {ANOTHER}",
     r"another service writes this journal; end it first":
         "ein anderer Dienst schreibt dieses Journal; ihn zuerst beenden",
     r"the journal of cell '(?P<other>.+)', not of '(?P<own>.+)'; name another file":
-        r"das Journal der Zelle „\g<other>“, nicht von „\g<own>“; eine andere Datei angeben",
+        rf"das Journal der Zelle „\g<other>“, nicht von „\g<own>“; {ANOTHER}",
     r"the journal(?: of cell '(?P<cell>.+)')? has format (?P<format>\d+), this version of the program knows "
     r"(?P<least>\d+) to (?P<most>\d+); it is left as it is: run the version that wrote it, or name another "
     r"file to begin anew":

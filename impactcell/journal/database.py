@@ -22,6 +22,7 @@ from impactcell.journal.checksums import row_crc
 from impactcell.journal.schema import APPLICATION_ID, COLUMNS, FORMAT, OLDEST, TABLES, UPGRADES
 
 WAY_OUT: Final = "run the version that wrote it, or name another file to begin anew"
+ANOTHER: Final = "it is left as it is; name another file"
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT)
 _DAMAGED: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 _MAGIC: Final = b"SQLite format 3\0"
@@ -122,7 +123,7 @@ def open_database(
         It is damaged.
     """
     if not read_only:
-        _check_header(path)
+        check_header(path)
     with errors(path):
         database = sqlite3.connect(
             f"{path.absolute().as_uri()}?{_read_only_query(path) if read_only else 'mode=rwc'}",
@@ -171,7 +172,7 @@ def _pages(database: sqlite3.Connection, path: Path, *, read_only: bool) -> int:
     except sqlite3.DatabaseError as error:
         code = _code(error)
         if code in _DAMAGED and not _is_ours(path):
-            raise ForeignJournalError(f"{path}: not a journal ({error}); it is left as it is") from error
+            raise ForeignJournalError(f"{path}: not a journal ({error}); {ANOTHER}") from error
         if code == sqlite3.SQLITE_CANTOPEN and read_only:
             raise JournalError(
                 f"{path}: cannot be read where it lies ({error}): SQLite has to write beside it; copy it, "
@@ -197,7 +198,7 @@ def set_aside(path: Path) -> Path:
     return aside
 
 
-def _check_header(path: Path) -> None:
+def check_header(path: Path) -> None:
     """Refuse a file that is not ours before SQLite has it.
 
     SQLite takes a single byte for an empty file, and writes another program's log into its database. For the
@@ -211,9 +212,9 @@ def _check_header(path: Path) -> None:
     if not head or path.with_name(f"{path.name}-journal").exists():  # new, or cut off while it was made
         return
     if not head.startswith(_MAGIC):
-        raise ForeignJournalError(f"{path}: not a journal, not even a database; it is left as it is")
+        raise ForeignJournalError(f"{path}: not a journal, not even a database; {ANOTHER}")
     if int.from_bytes(head[_APPLICATION_ID_AT:]) != APPLICATION_ID:
-        raise ForeignJournalError(f"{path}: a database, but no journal of impactcell; it is left as it is")
+        raise ForeignJournalError(f"{path}: a database, but no journal of impactcell; {ANOTHER}")
 
 
 def _create(database: sqlite3.Connection, cell: str) -> None:
@@ -232,7 +233,7 @@ def _check(database: sqlite3.Connection, path: Path, cell: str | None) -> None:
     """Refuse what is no journal, of a format that is not known, or of another cell than `cell`."""
     application_id, version = _pragma(database, "application_id"), _pragma(database, "user_version")
     if application_id != APPLICATION_ID:
-        raise ForeignJournalError(f"{path}: a database, but no journal of impactcell; it is left as it is")
+        raise ForeignJournalError(f"{path}: a database, but no journal of impactcell; {ANOTHER}")
     if not OLDEST <= version <= FORMAT:
         of = "" if cell is None else f" of cell '{cell}'"
         raise ForeignJournalError(

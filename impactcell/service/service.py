@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 
 from impactcell import cell as core
 from impactcell.alarms.rules import journal_fault
-from impactcell.errors import JournalError
+from impactcell.errors import ForeignJournalError, JournalError
 from impactcell.fieldbus.transports import Transports
 from impactcell.numerics.compilation import on_compilation
 from impactcell.opcua.large_requests import leave_full_rounds_to_the_server
@@ -63,7 +63,8 @@ class Service:
     Raises
     ------
     JournalError
-        No journal can be opened, and trying again cannot help; nothing has been started.
+        No journal can be opened, and trying again cannot help; nothing has been started. Where none is theirs
+        to open, a ForeignJournalError.
     """
 
     def __init__(
@@ -120,14 +121,15 @@ class Service:
 
     def _create_tasks(self) -> None:
         """Make every cell that can run."""
-        faults: list[JournalError] = []
+        faults: dict[str, JournalError] = {}
         for cell in self._cells:
             try:
                 self.running[cell.name] = CellTask(cell, self._on_snapshot, self._transports[cell.name])
             except JournalError as error:
-                faults.append(error)
-        if faults and not self.running and not any(fault.retry for fault in faults):
-            raise JournalError("\n".join(map(str, faults)))
+                faults[cell.fault("journal.file", f"journal.file: {error}")] = error
+        if faults and not self.running and not any(fault.retry for fault in faults.values()):
+            is_foreign = all(isinstance(fault, ForeignJournalError) for fault in faults.values())
+            raise (ForeignJournalError if is_foreign else JournalError)("\n".join(faults))
 
     def _health(self) -> list[CellHealth]:
         cells = [(cell.name, self.running.get(cell.name)) for cell in self._cells]

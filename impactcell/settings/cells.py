@@ -10,6 +10,7 @@ from impactcell.errors import MapError, SettingsError
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.prediction.model import Model
 from impactcell.process import yaml_loader
+from impactcell.process.yaml_loader import Positions
 from impactcell.settings.model_file import read_model
 from impactcell.settings.sections import CellSettings
 
@@ -25,11 +26,16 @@ class CellConfig:
     settings: CellSettings
     register_map: RegisterMap
     model: Model
+    positions: Positions
 
     @property
     def name(self) -> str:
         """Name of the cell, in OPC UA, in logs and in messages."""
         return self.settings.cell
+
+    def fault(self, key: str, message: str) -> str:
+        """Say what is wrong with a key of its file, as in `journal.file`, or else with its section."""
+        return yaml_loader.format_error(self.path, self.positions.value(key.split(".")), message)
 
 
 def read_cell(path: Path) -> CellConfig:
@@ -43,7 +49,7 @@ def read_cell(path: Path) -> CellConfig:
     faults: list[str] = []
     settings = register_map = model = None
     try:
-        settings, _ = yaml_loader.read(path, CellSettings)
+        settings, positions = yaml_loader.read(path, CellSettings)
         map_file: Path | None = settings.module.register_map
         model_file: Path | None = settings.model
         order = settings.module.word_order
@@ -60,7 +66,7 @@ def read_cell(path: Path) -> CellConfig:
         faults.append(str(error))
     if settings is None or register_map is None or model is None:
         raise SettingsError("\n".join(faults))
-    return CellConfig(path, settings, register_map, model)
+    return CellConfig(path, settings, register_map, model, positions)
 
 
 def _referenced_files(path: Path) -> tuple[Path | None, Path | None]:

@@ -45,9 +45,21 @@ def _existing_parent(path: Path) -> Path:
     return path
 
 
+def _no_file_in_its_way(path: Path, info: ValidationInfo) -> Path:
+    existing = next((part for part in (path, *path.parents) if part.exists()), path)
+    if existing.exists() and not existing.is_dir():
+        raise ValueError(
+            f"{existing} is a file, {info.field_name} names a directory; name another, "
+            "which is made where it is not there"
+        )
+    return path
+
+
 AnyPath = Annotated[Path, BeforeValidator(_resolved)]
 InputFile = Annotated[AnyPath, AfterValidator(_existing_file)]
 ModelFile = Annotated[AnyPath, AfterValidator(_existing_model)]
+OutputDirectory = Annotated[AnyPath, AfterValidator(_no_file_in_its_way)]
+"""A directory that is there, or can be made."""
 OutputFile = Annotated[AnyPath, AfterValidator(_existing_parent)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 """A finite number above 0."""

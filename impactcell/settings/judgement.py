@@ -14,6 +14,7 @@ from impactcell.errors import AccessError, JournalError
 from impactcell.features import noise_std
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.map_registers import unknown_names
+from impactcell.journal.refusal import refusal
 from impactcell.journal.store import Journal
 from impactcell.prediction.mass_interpolation import velocity_range_m_s
 from impactcell.process import yaml_loader
@@ -263,7 +264,10 @@ def _of_map(cell: CellConfig) -> Iterator[_Remark]:
 def _of_service(cell: CellConfig) -> Iterator[_Remark]:
     settings = cell.settings
     yield from _of_users(settings.opcua.users_file)
-    if settings.journal is None:
+    if settings.journal is not None:
+        if why := refusal(settings.journal.file, cell.name):
+            yield _Remark(("journal", "file"), f"journal.file: {why}")
+    else:
         yield _Remark((), "no journal: what the cell learns is lost with every restart", is_fault=False)
 
 

@@ -17,6 +17,7 @@ from impactcell.settings.fields import (
     InputFile,
     ModelFile,
     NotNegative,
+    OutputDirectory,
     OutputFile,
     Positive,
     Probability,
@@ -216,7 +217,7 @@ class OpcUaSection(Section):
     """Where SCADA connects; an address other than loopback opens it to the network."""
     users_file: AnyPath = Field(default="users.yaml", validate_default=True)
     """Users and roles, made by `impactcell users`; while there is none, nobody can log in."""
-    certificates_dir: AnyPath = Field(default="pki", validate_default=True)
+    certificates_dir: OutputDirectory = Field(default="pki", validate_default=True)
     """Own, trusted and rejected certificates, made by `impactcell certs`."""
     allow_sessions_without_encryption: bool = False
     """Opens sessions over security policy None, where anybody can listen; every start then warns."""

@@ -5,7 +5,7 @@ from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, model_validator
 
-from impactcell.settings.fields import AnyPath, InputFile, Section, page_endpoint
+from impactcell.settings.fields import InputFile, OutputDirectory, Section, page_endpoint
 
 
 class WebSection(Section):
@@ -17,7 +17,7 @@ class WebSection(Section):
     """Certificate (PEM) of the page, for https."""
     key: InputFile | None = None
     """Its private key (PEM)."""
-    studies_dir: AnyPath | None = None
+    studies_dir: OutputDirectory | None = None
     """Directory for the measurements that people drop on the page; absent: `studies` beside the cell file."""
     allow_without_encryption: bool = False
     """Opens plain http beyond loopback, where anybody can listen; every start then warns."""

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from impactcell.errors import JournalError, JournalFullError, JournalUnavailableError
+from impactcell.errors import ForeignJournalError, JournalError, JournalFullError, JournalUnavailableError
 from impactcell.journal.database import errors
+from impactcell.journal.refusal import refusal
 from impactcell.journal.store import Journal
 
 
@@ -39,6 +40,51 @@ def test_a_file_with_a_second_name_is_refused_under_both(tmp_path: Path) -> None
         assert journal.cell == "c"
     other.unlink()
     Journal(path, "c").close()
+
+
+def test_no_lock_is_begun_beside_what_is_no_journal(tmp_path: Path) -> None:
+    path = tmp_path / "users.yaml"
+    path.write_text("users: []\n")
+    with pytest.raises(
+        ForeignJournalError, match="not even a database; it is left as it is; name another file"
+    ):
+        Journal(path, "c")
+    assert [file.name for file in tmp_path.iterdir()] == ["users.yaml"]
+    assert path.read_text() == "users: []\n"
+
+
+@pytest.mark.parametrize("content", [b"", None])
+def test_a_file_that_can_become_a_journal_is_not_refused(tmp_path: Path, content: bytes | None) -> None:
+    path = tmp_path / "j"
+    if content is not None:
+        path.write_bytes(content)
+    assert refusal(path, "c") == ""
+    assert path.exists() == (content is not None)
+
+
+def test_what_a_service_would_refuse_is_refused_and_left(tmp_path: Path) -> None:
+    path, other = tmp_path / "j", tmp_path / "other"
+    with Journal(path, "c"):
+        pass
+    assert refusal(path, "c") == ""
+    assert refusal(path, "d").endswith("the journal of cell 'c', not of 'd'; name another file")
+    os.link(path, other)
+    assert "has another name as well (a hard link)" in refusal(path, "c")
+    theirs = tmp_path / "theirs"
+    with sqlite3.connect(theirs) as database:
+        database.execute("CREATE TABLE theirs (x)")
+    database.close()
+    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+    assert "a database, but no journal of impactcell" in refusal(theirs, "c")
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
+def test_a_damaged_journal_is_not_refused_for_it_is_put_aside(tmp_path: Path) -> None:
+    path = tmp_path / "j"
+    Journal(path, "c").close()
+    whole = path.read_bytes()
+    path.write_bytes(whole[:100] + b"\xff" * (len(whole) - 100))
+    assert refusal(path, "c") == ""
 
 
 def sqlite_error(code: int, name: str, text: str) -> sqlite3.OperationalError:

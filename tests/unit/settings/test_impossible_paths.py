@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from impactcell.cli.app import run_verb
 from impactcell.errors import JournalError, SettingsError
 from impactcell.journal.store import Journal
 from impactcell.process import yaml_loader
@@ -69,6 +70,40 @@ def test_a_path_through_a_loop_of_links_is_told(tmp_path: Path) -> None:
         SettingsError, match=r"cell\.yaml:\d+:\d+: journal\.file: .*cannot be used as a path .*oop"
     ):
         read_cell(cell_file(tmp_path, "journal.file", "round/x"))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "column"),
+    [("opcua.certificates_dir", "users.yaml", 27), ("web.studies_dir", "users.yaml/studies", 20)],
+)
+def test_a_directory_where_a_file_is_in_its_way_is_told(
+    tmp_path: Path, key: str, value: str, column: int
+) -> None:
+    """`check` found such a cell in order; `run` ended with `users.yaml/own: Not a directory`."""
+    (tmp_path / "users.yaml").write_text("users: []\n")
+    told = (
+        rf"cell\.yaml:6:{column}: {re.escape(key)}: {tmp_path}/users.yaml is a file, {key.partition('.')[2]} "
+        "names a directory; name another, which is made where it is not there$"
+    )
+    with pytest.raises(SettingsError, match=told):
+        read_cell(cell_file(tmp_path, key, value))
+    read_cell(cell_file(tmp_path, key, "not/there/yet"))
+
+
+def test_a_journal_that_is_none_is_told_by_check_as_by_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`check` found such a cell in order; `run` named no cell, no key, no way out, and left a lock."""
+    (tmp_path / "users.yaml").write_text("users: []\n")
+    cell = cell_file(tmp_path, "journal.file", "users.yaml")
+    told = (
+        f"{cell}:6:17: journal.file: {tmp_path}/users.yaml: not a journal, not even a database; "
+        "it is left as it is; name another file"
+    )
+    for verb in ("check", "run"):
+        assert exit_code_of("impactcell", lambda verb=verb: run_verb([verb, str(cell)])) == ExitCode.BAD_INPUT
+        assert told in capsys.readouterr().err.splitlines()
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["cell.yaml", "users.yaml"]
 
 
 @pytest.mark.parametrize("text", ['module: {host: "a\\0b"}', 'module: {"ho\\0st": a}', '- ["a\\u0007"]'])
