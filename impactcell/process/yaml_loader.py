@@ -104,7 +104,9 @@ def load(path: Path) -> tuple[object, Positions]:
     except OSError as fault:
         raise SettingsError(f"{path}: cannot be read: {fault.strerror}") from fault
     except UnicodeDecodeError as fault:
-        raise SettingsError(f"{path}: is not UTF-8 text (byte {fault.start}); save it as UTF-8") from fault
+        place, byte = _end_of(fault.object[: fault.start].decode()), fault.object[fault.start]
+        message = f"is not UTF-8 text (byte 0x{byte:02X} here); save it as UTF-8"
+        raise SettingsError(format_error(path, place, message)) from fault
     try:
         loader = CoreLoader(text)
         try:
@@ -122,13 +124,17 @@ def load(path: Path) -> tuple[object, Positions]:
         told = _WAYS_OUT.get(str(fault.problem), f"{fault.problem}{context}")
         raise SettingsError(f"{path}:{place}: {told}") from fault
     except yaml.reader.ReaderError as fault:
-        before = text[: fault.position]
-        place = FilePosition(before.count("\n") + 1, fault.position - (before.rfind("\n") + 1) + 1)
+        place = _end_of(text[: fault.position])
         raise SettingsError(f"{path}:{place}: a character YAML does not allow ({fault.reason})") from fault
     except RecursionError as fault:
         raise SettingsError(f"{path}:1:1: nested too deeply") from fault
     except ValueError as fault:
         raise SettingsError(f"{path}:1:1: {fault}") from fault
+
+
+def _end_of(text: str) -> FilePosition:
+    """Place behind a text that a file begins with."""
+    return FilePosition(text.count("\n") + 1, len(text) - text.rfind("\n"))
 
 
 def _positions(path: Path, root: yaml.Node) -> Positions:

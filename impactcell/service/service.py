@@ -126,7 +126,7 @@ class Service:
             try:
                 self.running[cell.name] = CellTask(cell, self._on_snapshot, self._transports[cell.name])
             except JournalError as error:
-                faults[cell.fault("journal.file", f"journal.file: {error}")] = error
+                faults[cell.fault(f"journal.file: {error}", "journal.file")] = error
         if faults and not self.running and not any(fault.retry for fault in faults.values()):
             is_foreign = all(isinstance(fault, ForeignJournalError) for fault in faults.values())
             raise (ForeignJournalError if is_foreign else JournalError)("\n".join(faults))

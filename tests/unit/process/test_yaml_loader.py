@@ -141,8 +141,17 @@ def test_a_missing_file_a_directory_and_bytes_are_named(tmp_path: Path) -> None:
         load(tmp_path / "nowhere.yaml")
     with pytest.raises(SettingsError, match="cannot be read: Is a directory"):
         load(tmp_path)
-    (tmp_path / "b.yaml").write_bytes(b"a: \xff\n")
-    with pytest.raises(SettingsError, match=r"is not UTF-8 text \(byte \d+\); save it as UTF-8"):
+
+
+@pytest.mark.parametrize(
+    ("content", "place"),
+    [(b"a: \xff\n", "1:4"), (b"\xef\xbb\xbfa: \xff\n", "1:4"), ("a: 1\nü: ".encode() + b"\xff", "2:4")],
+)
+def test_bytes_that_are_no_text_are_told_with_their_place(tmp_path: Path, content: bytes, place: str) -> None:
+    (tmp_path / "b.yaml").write_bytes(content)
+    with pytest.raises(
+        SettingsError, match=rf"b\.yaml:{place}: is not UTF-8 text \(byte 0xFF here\); save it as UTF-8$"
+    ):
         load(tmp_path / "b.yaml")
 
 

@@ -95,7 +95,9 @@ def test_cells_of_one_line_agree_about_it(tmp_path: Path) -> None:
     second = cell_file(tmp_path, "b", transport="rtu", serial=line, device_id=2)
     assert len(read_cells([first, second])) == 2
     faster = cell_file(tmp_path, "c", transport="rtu", serial={**line, "baudrate": 9600}, device_id=3)
-    with pytest.raises(SettingsError, match=r"has another module\.serial; they share one connection"):
+    with pytest.raises(
+        SettingsError, match=r"has another module\.serial; they share one connection: give both the same$"
+    ):
         read_cells([first, faster])
     other_line = cell_file(tmp_path, "d", transport="rtu", serial={"device": "/dev/ttyUSB1"})
     assert len(read_cells([first, other_line])) == 2

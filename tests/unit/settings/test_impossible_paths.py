@@ -1,6 +1,7 @@
 """What no path and no name can be is told with file, line, key and a way out, wherever a file has it."""
 
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -101,7 +102,7 @@ def test_a_journal_that_is_none_is_told_by_check_as_by_run(
         "it is left as it is; name another file"
     )
     for verb in ("check", "run"):
-        assert exit_code_of("impactcell", lambda verb=verb: run_verb([verb, str(cell)])) == ExitCode.BAD_INPUT
+        assert exit_code_of("impactcell", partial(run_verb, [verb, str(cell)])) == ExitCode.BAD_INPUT
         assert told in capsys.readouterr().err.splitlines()
     assert sorted(file.name for file in tmp_path.iterdir()) == ["cell.yaml", "users.yaml"]
 

@@ -150,22 +150,62 @@ def test_cells_of_one_process_do_not_share_what_is_one_cells(config: Path) -> No
     assert "same journal file" in str(caught.value)
     assert "same module and register map" in str(caught.value)
     assert "same endpoint" in str(caught.value)
+    for place, way_out in (
+        ("3:12", "change host, port or device_id of one, or give one another register_map"),
+        ("2:17", "a journal belongs to one cell: name another file"),
+        ("1:1", "opcua.max_sessions is 3 here and 100 there; cells at one port share one server: give both"),
+    ):
+        assert any(place and way_out in line for line in str(caught.value).splitlines())
     namesake = edited(config, "port: 15020", "port: 15021", "namesake")
-    with pytest.raises(SettingsError, match=r"cell 'prototype' is in .*first.yaml too; rename one"):
+    told = r"namesake.yaml:4:7: cell 'prototype' is in .*first.yaml too; rename one"
+    with pytest.raises(SettingsError, match=told):
         read_cells([first, namesake])
     with pytest.raises(SettingsError, match=r"first.yaml: is given twice; name it once$"):
         read_cells([first, first])
     assert [cell.name for cell in read_cells([first])] == ["prototype"]
 
 
+def test_cells_begun_in_two_directories_are_told_which_settings_differ(config: Path) -> None:
+    """Their users and certificates lie beside each: what differs stood nowhere, nor where to change it."""
+    for name, port in (("first", 15021), ("second", 15022)):
+        path = edited(config, "port: 15020", f"port: {port}", name)
+        directory = config / name
+        directory.mkdir()
+        text = path.read_text().replace("cell: prototype", f"cell: {name}").replace("../", "../../")
+        if name == "second":
+            text += "opcua: {users_file: users.yaml, certificates_dir: pki}\n"
+        text = text.replace("../../maps", "../maps").replace("../../models", "../models")
+        (directory / f"{name}.yaml").write_text(text)
+    cells = [config / "first" / "first.yaml", config / "second" / "second.yaml"]
+    with pytest.raises(SettingsError) as caught:
+        read_cells(cells)
+    line = len(cells[1].read_text().splitlines())
+    there, here = config / "first", config / "second"
+    page, server = str(caught.value).splitlines()
+    assert page == (
+        f"{cells[1]}:{line}:21: {cells[0]} is on the same page (web.endpoint), but has another "
+        f"opcua.users_file ({here}/users.yaml here, {there}/users.yaml there); give both the same, or one a "
+        "web.endpoint of its own"
+    )
+    assert server == (
+        f"{cells[1]}:{line}:21: {cells[0]} has the same endpoint, but other opcua settings: "
+        f"opcua.users_file is {here}/users.yaml here and {there}/users.yaml there, "
+        f"opcua.certificates_dir is {here}/pki here and {there}/pki there; "
+        "cells at one port share one server: give both the same, or one an opcua.endpoint of another port"
+    )
+
+
 @pytest.mark.parametrize(
     ("sections", "told"),
     [
-        ("monitoring: {port: 8480}", "monitoring.port and web.endpoint are both port 8480; change one"),
+        (
+            "monitoring: {port: 8480}",
+            "20:20: monitoring.port and web.endpoint are both port 8480; change one",
+        ),
         ("monitoring: {port: 4840, host: 0.0.0.0}", "monitoring.port and opcua.endpoint are both port 4840"),
         (
             "web: {endpoint: 'http://127.0.0.1:4840'}",
-            "opcua.endpoint and web.endpoint are both port 4840; change one",
+            "20:17: opcua.endpoint and web.endpoint are both port 4840; change one",
         ),
     ],
 )
