@@ -1,10 +1,12 @@
 """`impactcell init`: the files of an own cell, each with what it needs, from a few answers."""
 
+import contextlib
 import math
 import shlex
 import shutil
 import statistics
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Final
@@ -24,7 +26,7 @@ from impactcell.prediction import PROVISIONAL, Model
 from impactcell.prediction.model import Prior
 from impactcell.process.console import print_note, print_result
 from impactcell.process.shipped import shipped_config
-from impactcell.settings import read_cell
+from impactcell.settings import read_cell, read_register_map
 from impactcell.settings.fields import cell_name, module_host
 from impactcell.settings.judgement import judge_cell
 from impactcell.settings.model_file import write_model
@@ -123,6 +125,7 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
             raise SettingsError(f"--{option} {value!r}: {error}") from error
     check_directory(directory, SettingsError)
     source = _map_file(answers.register_map)
+    read_register_map(source)  # what is wrong with it is told of the user's own file
     cell, model = directory / f"{answers.name}.yaml", directory / f"{answers.name}.model.yaml"
     target_map = directory / source.name
     if target_map in (cell, model):  # each keeps its own name
@@ -141,12 +144,15 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
             _with_measured_noise(answers, taps),
         )
     text = TOP + yaml.safe_dump(_cell(answers, target_map), sort_keys=False)
+    begun = [cell, model, *([] if has_map else [target_map])]
+    made = [part for part in (directory, *directory.parents) if not part.exists()]
     try:
         directory.mkdir(parents=True, exist_ok=True)
         if not has_map:
             shutil.copyfile(source, target_map)
         cell.write_text(text, encoding="utf-8")
     except OSError as error:
+        _take_back(begun, made)
         raise SettingsError(f"{error.filename or directory}: cannot be written: {error.strerror}") from error
     try:
         write_model(provisional_model(answers) if first is None else first.fit.model, model)
@@ -157,8 +163,7 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
         write_model(calibrated_model(config), model)
         findings = judge_cell(read_cell(cell))
     except Exception as error:
-        for begun in (cell, model, *([] if has_map else [target_map])):
-            begun.unlink(missing_ok=True)  # what was not begun whole is not begun
+        _take_back(begun, made)
         if isinstance(error, PredictionError) and (doubts := _doubts(answers)):
             raise PredictionError("; ".join([str(error), *doubts])) from error
         raise
@@ -168,6 +173,15 @@ def init(directory: Path, answers: Answers, campaign: Path | None) -> None:
     if first is not None:
         say_first_model(first, model)
     print_result(_next_steps(cell, directory, is_provisional=first is None))
+
+
+def _take_back(files: Sequence[Path], directories: Sequence[Path]) -> None:
+    """Remove files, and directories, the innermost first: what was not begun whole is not begun."""
+    with contextlib.suppress(OSError):
+        for file in files:
+            file.unlink(missing_ok=True)
+        for directory in directories:
+            directory.rmdir()
 
 
 def provisional_model(answers: Answers) -> Model:

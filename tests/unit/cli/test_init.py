@@ -97,8 +97,18 @@ def test_a_part_that_does_not_slide_for_an_answer_in_another_unit_says_so(
     with pytest.raises(PredictionError, match=told):
         run_verb(["init", str(tmp_path / "own"), *ANSWERS, "--wear-limit", "25"])
     with pytest.raises(PredictionError, match=r"no part slides free$"):
-        run_verb(["init", str(tmp_path / "own"), *ANSWERS])
-    assert list((tmp_path / "own").iterdir()) == []
+        run_verb(["init", str(tmp_path / "cells" / "own"), *ANSWERS])
+    assert list(tmp_path.iterdir()) == [], "nor the directories that were made for it"
+
+
+def test_a_map_with_a_fault_is_told_by_its_own_name_and_nothing_is_written(tmp_path: Path) -> None:
+    """What was told was the copy, which is removed again; the empty directory stayed."""
+    own = tmp_path / "own-map.yaml"
+    shipped = shipped_config() / "maps" / "fpga-v1.yaml"
+    own.write_text(shipped.read_text().replace("type: u16, expect: 1", "type: u17, expect: 1"))
+    with pytest.raises(SettingsError, match=rf"^{re.escape(str(own))}:\d+:\d+: register \w+: type must be"):
+        run_verb(["init", str(tmp_path / "cell"), *ANSWERS, "--map", str(own)])
+    assert [path.name for path in tmp_path.iterdir()] == ["own-map.yaml"]
 
 
 def test_a_cell_from_nothing_can_be_read_and_says_what_to_do(
@@ -201,7 +211,7 @@ def test_a_map_that_says_otherwise_is_named_and_another_map_is_not_taken_for_it(
     own.write_text(theirs.replace("address: 12,", "address: 70000,"))
     with pytest.raises(SettingsError, match="70000"):
         run_verb(["init", *answers])
-    assert not list((tmp_path / "cell").iterdir()), "nothing is left of what was not begun"
+    assert not (tmp_path / "cell").exists(), "nothing is left of what was not begun"
     own.write_text(theirs)
     run("init", *answers)
     with pytest.raises(
