@@ -10,6 +10,12 @@ REGISTER_SPACE: Final = 65_536
 """Addresses of a table: 16 bits."""
 _OUTSIDE_CRC: Final = ("window_sequence", "capture_ready", "capture_crc32")
 """What is read with a header and may lie outside of what its CRC covers."""
+_BETWEEN_SEQUENCES: Final = (
+    "must lie between window_sequence and window_sequence_after: what is read before the one or after the "
+    "other can change unseen; have the module show it there, or leave both out of the map: a capture without "
+    "a CRC is then read twice"
+)
+"""What all of a capture owes to its sequence numbers, why, and the way out."""
 _COUNTERS: Final = ("cycle_counter", "ring_cycle", "window_cycle", "session", "window_session")
 """What counts, or tells one start of the module from another."""
 _LARGEST: Final[Mapping[str, int]] = {
@@ -111,10 +117,11 @@ def _sequence_faults(registers: Mapping[str, Register], arrays: list[Register]) 
     if len({register.table for register in (*arrays, first, last)}) > 1:
         yield "the capture window must lie in one table"
     elif not all(first.end <= register.address and register.end <= last.address for register in arrays):
-        yield "force, position and actuator must lie between window_sequence and window_sequence_after"
+        names = " and ".join(register.name for register in arrays)
+        yield f"register{'s' * (len(arrays) > 1)} {names} {_BETWEEN_SEQUENCES}"
     for register in _header_of(registers):
         if register.table == first.table and not first.address <= register.address < last.address:
-            yield f"register {register.name} must lie between window_sequence and window_sequence_after"
+            yield f"register {register.name} {_BETWEEN_SEQUENCES}"
 
 
 def _crc_faults(registers: Mapping[str, Register]) -> Iterator[str]:

@@ -195,6 +195,15 @@ def changed(declaration: dict[str, Any], name: str, **entry: Any) -> dict[str, A
             {"address": 200},
             "must lie between window_sequence and window_sequence_after",
         ),
+        (
+            "capture_ready",
+            {"address": 100, "type": "u16"},
+            (
+                "register capture_ready must lie between window_sequence and window_sequence_after: what is "
+                "read before the one or after the other can change unseen; have the module show it there, or "
+                "leave both out of the map: a capture without a CRC is then read twice"
+            ),
+        ),
         ("ring_cycle", {"count": 1}, "ring_cycle must be an array"),
         ("extra", {"address": 40_000}, "extra: type is missing"),
         ("state", {"codes": {0: False}}, "state: codes must be whole numbers with their names"),
