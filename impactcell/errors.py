@@ -23,6 +23,8 @@
     │   ├── MapError              a map that overlaps itself or leaves the registers
     │   ├── WrongDeviceError      identity or map version is not what the cell file says
     │   ├── LinkError             not connected, lost, or no answer in time (retry)
+    │   │   ├── NoAnswerError         ... the connection stands, the device is silent
+    │   │   └── ConnectionLostError   ... the peer has closed it
     │   ├── ProtocolError         the peer broke the protocol; nothing used (retry)
     │   │   └── NotDecimalError   a decimal code with a digit above 9
     │   └── ModbusExceptionError  the peer refused a request, with its code (retry)
@@ -152,6 +154,14 @@ class LinkError(FieldbusError):
     """Not connected, connection lost, or no answer in time."""
 
     retry: ClassVar[bool] = True
+
+
+class NoAnswerError(LinkError):
+    """The connection stood, and the device did not answer in time."""
+
+
+class ConnectionLostError(LinkError):
+    """The peer closed the connection."""
 
 
 class ProtocolError(FieldbusError):

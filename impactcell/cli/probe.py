@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from impactcell.cell.preprocessing import fill_defaults
-from impactcell.errors import FieldbusError
+from impactcell.errors import ConnectionLostError, FieldbusError, LinkError, NoAnswerError, WrongDeviceError
 from impactcell.features import extract, impulse_balance
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.map_promises import not_promised
@@ -17,6 +17,7 @@ from impactcell.fieldbus.probe import ProbeResult
 from impactcell.fieldbus.probe import probe as probe_module
 from impactcell.fieldbus.transports import transport_for
 from impactcell.prediction.mass_interpolation import velocity_range_m_s
+from impactcell.process import yaml_loader
 from impactcell.process.console import print_result
 from impactcell.records import MM_PER_MIN, Capture, Channel
 from impactcell.service.factory import cell_design, module_link
@@ -44,7 +45,11 @@ def probe(cell: Path) -> None:
     config = read_cell(cell)
     link = module_link(config)
     module = ModuleAcquisition(config.name, ModbusClient(transport_for(link)), config.register_map)
-    result = asyncio.run(probe_module(module))
+    try:
+        result = asyncio.run(probe_module(module))
+    except FieldbusError as error:
+        own = str(error).removeprefix(f"{config.name}: ")
+        raise FieldbusError(f"{config.name}: {own}{_hint(config, error)}") from error
     rows = [("link", f"{link}, {1e3 * result.round_trip_s:.2f} ms a request"), *_rows(result)]
     rows.insert(1, ("in flight", result.window))
     if result.capture is not None:
@@ -56,6 +61,35 @@ def probe(cell: Path) -> None:
     print_result("\n".join(f"{name:12}{text}" for name, text in rows))
     if result.faults:
         raise FieldbusError("\n".join(result.faults))
+
+
+def _hint(config: CellConfig, error: FieldbusError) -> str:
+    """Say what may be wrong where the message does not, and which line says it."""
+    device_id, device = config.settings.module.device_id, config.place("module.device_id")
+    if isinstance(error, NoAnswerError):
+        return (
+            f"; device_id {device_id} may be wrong, for a module may be silent to another's (see {device}); "
+            "or another client, the service for one, holds a module that takes one: end that, then probe"
+        )
+    if isinstance(error, ConnectionLostError):
+        return (
+            "; a module that takes one client may have closed it for another, the service for one: end that, "
+            "then probe"
+        )
+    if isinstance(error, LinkError):
+        return f"; see {config.place('module.host', 'module.port')}"
+    return f"; see {_line_of(config, str(error))}" if isinstance(error, WrongDeviceError) else ""
+
+
+def _line_of(config: CellConfig, fault: str) -> str:
+    """Say which line of cell file or map makes a module another than it should be."""
+    module = config.settings.module
+    if "word_order" not in fault:
+        return config.place("module.device_id" if "device_id" in fault else "module.register_map")
+    if module.word_order is not None:
+        return config.place("module.word_order")
+    _, positions = yaml_loader.load(module.register_map)
+    return f"{module.register_map}:{positions.key(('word_order',))}"
 
 
 def _rows(result: ProbeResult) -> Iterator[tuple[str, str]]:

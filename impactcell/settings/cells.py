@@ -28,14 +28,15 @@ class CellConfig:
         return self.settings.cell
 
     def fault(self, message: str, *keys: str) -> str:
-        """Say what is wrong, with the place of the first of some keys that its file has, or of their section.
+        """Say what is wrong, with the `place` of some keys."""
+        return f"{self.place(*keys)}: {message}"
 
-        Keys are named as in `journal.file`.
-        """
+    def place(self, *keys: str) -> str:
+        """Say where its file has the first of some keys, as in `journal.file`, or else their section."""
         paths = [tuple(key.split(".")) for key in keys]
         whole = [path for path in paths if self.positions.existing_path(path) == path]
         place = (whole or sorted(paths, key=lambda path: -len(self.positions.existing_path(path))))[0]
-        return yaml_loader.format_error(self.path, self.positions.value(place), message)
+        return f"{self.path}:{self.positions.value(place)}"
 
 
 def read_cell(path: Path) -> CellConfig:

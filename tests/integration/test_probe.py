@@ -1,5 +1,7 @@
 """`impactcell probe` looks at a live module. Truth: what the simulator says it did."""
 
+import asyncio
+import re
 from pathlib import Path
 
 import pytest
@@ -41,8 +43,11 @@ async def test_identity_status_and_one_tap_are_shown(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"word_order": "little"}, "the word order is wrong, with `word_order: big` all of it can be"),
-        ({"device_id": 9}, "device_id 9 is wrong"),
+        (
+            {"word_order": "little"},
+            r"press-1: .*the word order is wrong, with `word_order: big` all of it can be; see \S+:\d+:\d+$",
+        ),
+        ({"device_id": 9}, r"press-1: .*device_id 9 is wrong; see \S+press-1\.yaml:\d+:14$"),
     ],
 )
 async def test_what_is_wrong_is_named(tmp_path: Path, change: dict[str, object], told: str) -> None:
@@ -50,7 +55,49 @@ async def test_what_is_wrong_is_named(tmp_path: Path, change: dict[str, object],
         cell = write_cell(tmp_path, module["port"], module={"timeout_ms": 4000, **change})
         code, out, err = await probed(cell)
     assert (code, out) == (1, "")
-    assert told in err
+    assert re.search(told, err, re.MULTILINE)
+    place = re.search(r"see (\S+):(\d+):(\d+)$", err, re.MULTILINE)
+    assert place is not None
+    lines = await asyncio.to_thread(Path(place[1]).read_text)
+    assert next(iter(change)) in lines.splitlines()[int(place[2]) - 1]
+
+
+@pytest.mark.parametrize("transport", ["tcp", "rtu_over_tcp", "udp"])
+async def test_a_module_that_stays_silent_has_its_device_id_named(tmp_path: Path, transport: str) -> None:
+    """A module may answer no device_id but its own, or no client but its first."""
+    loop = asyncio.get_running_loop()
+    if transport == "udp":
+        server, _ = await loop.create_datagram_endpoint(asyncio.DatagramProtocol, ("127.0.0.1", 0))
+        port = server.get_extra_info("sockname")[1]
+    else:
+        server = await loop.create_server(asyncio.Protocol, "127.0.0.1", 0)
+        port = server.sockets[0].getsockname()[1]
+    cell = write_cell(tmp_path, port, module={"device_id": 7, "transport": transport, "window": 1})
+    code, out, err = await probed(cell)
+    server.close()
+    assert (code, out) == (1, "")
+    assert re.match(
+        rf"impactcell: press-1: 127\.0\.0\.1:{port}.* device 7: no answer to .* within 0\.5 s; ", err
+    )
+    assert re.search(r"device_id 7 may be wrong, .* \(see \S+press-1\.yaml:\d+:14\); or another client", err)
+
+
+async def test_a_module_that_closes_the_connection_may_be_held_by_another(tmp_path: Path) -> None:
+    class Closing(asyncio.Protocol):
+        def data_received(self, _: bytes) -> None:
+            self.transport.close()
+
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            self.transport = transport
+
+    server = await asyncio.get_running_loop().create_server(Closing, "127.0.0.1", 0)
+    code, out, err = await probed(write_cell(tmp_path, server.sockets[0].getsockname()[1]))
+    server.close()
+    assert (code, out) == (1, "")
+    assert "press-1: " in err
+    assert (
+        "connection lost; a module that takes one client may have closed it for another, the service" in err
+    )
 
 
 @pytest.mark.parametrize(
@@ -120,4 +167,7 @@ async def test_a_module_that_is_not_there_is_named(tmp_path: Path) -> None:
         cell = write_cell(tmp_path, module["port"])
     code, out, err = await probed(cell)
     assert (code, out) == (1, "")
-    assert "nothing listens at this host and port" in err
+    assert re.search(
+        r"impactcell: press-1: \S+ device 1: .* nothing listens at this host and port; see \S+press-1",
+        err,
+    )

@@ -29,7 +29,14 @@ from pymodbus.exceptions import ModbusException
 from pymodbus.framer import FramerType
 from pymodbus.pdu import ModbusPDU
 
-from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
+from impactcell.errors import (
+    ConnectionLostError,
+    FieldbusError,
+    LinkError,
+    ModbusExceptionError,
+    NoAnswerError,
+    ProtocolError,
+)
 from impactcell.fieldbus.codec import Request
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.transports.reply_watch import MbapWatch, ReplyWatch, RtuWatch
@@ -152,7 +159,7 @@ class CheckedPymodbus:
             async with asyncio.timeout(timeout_s):
                 await client.execute(False, _RawRequest(request.pdu, device_id))  # noqa: FBT003 - pymodbus's
         except TimeoutError:
-            raise LinkError(f"no answer to {request.description} within {link.timeout_s:g} s") from None
+            raise NoAnswerError(f"no answer to {request.description} within {link.timeout_s:g} s") from None
         except ModbusException as error:
             raise ProtocolError(f"{request.description}: {error}") from error
         finally:
@@ -250,7 +257,7 @@ class CheckedPymodbus:
             return
         future = self._client.ctx.response_future
         if self._watch is not None and not future.done():
-            future.set_exception(LinkError("connection lost"))
+            future.set_exception(ConnectionLostError("connection lost"))
         else:
             self._on_lost()
 

@@ -10,7 +10,13 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Final, Protocol
 
-from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
+from impactcell.errors import (
+    ConnectionLostError,
+    FieldbusError,
+    LinkError,
+    ModbusExceptionError,
+    ProtocolError,
+)
 from impactcell.fieldbus.codec import BUSY, Request
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.request_batching import RequestBatch, join_queue
@@ -91,12 +97,12 @@ class SharedLine:
     def _lost(self) -> None:
         """Tell everyone that the peer has closed the connection."""
         for member in list(self._turn):
-            self._drop(member, "connection lost")
+            self._drop(member, ConnectionLostError(f"{member.link}: connection lost"))
 
-    def _drop(self, member: "LineTransport", reason: str) -> None:
+    def _drop(self, member: "LineTransport", why: LinkError) -> None:
         if member in self._turn:
             self._turn.remove(member)
-        member.fail(LinkError(f"{member.link}: {reason}"))
+        member.fail(why)
 
     async def _serve(self) -> None:
         loop = asyncio.get_running_loop()
@@ -120,7 +126,7 @@ class SharedLine:
             await self._open()
         except FieldbusError as error:
             for each in list(self._turn):
-                self._drop(each, str(error))
+                self._drop(each, LinkError(f"{each.link}: {error}"))
             return
         batch = member.next_request()
         if batch is None:

@@ -12,7 +12,14 @@ from collections import deque
 from collections.abc import Sequence
 from typing import Final
 
-from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, ProtocolError
+from impactcell.errors import (
+    ConnectionLostError,
+    FieldbusError,
+    LinkError,
+    ModbusExceptionError,
+    NoAnswerError,
+    ProtocolError,
+)
 from impactcell.fieldbus.codec import BUSY, check_reply
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.request_batching import Exchange, RequestBatch, join_queue
@@ -136,7 +143,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         """Fail what is pending (called by asyncio)."""
         self.lost.set()
         if self._transport is not None:
-            self.fail(LinkError(f"{self.link}: connection lost{f': {exc}' if exc else ''}"))
+            self.fail(ConnectionLostError(f"{self.link}: connection lost{f': {exc}' if exc else ''}"))
 
     def _send_waiting(self) -> bool:
         """Send what the window allows, in one write; return whether there was anything."""
@@ -192,7 +199,9 @@ class TcpConnection(asyncio.BufferedProtocol):
         timeout = f"within {self.link.timeout_s:g} s"
         if self._requests_in_flight > 1:
             timeout += f", of {self._requests_in_flight} in flight (window {self.window.size})"
-        self.fail(LinkError(f"{self.link}: no answer to {oldest.batch.requests[0].description} {timeout}"))
+        self.fail(
+            NoAnswerError(f"{self.link}: no answer to {oldest.batch.requests[0].description} {timeout}")
+        )
 
     def _consume_good_replies(self, stream: bytes) -> bytes:
         """Use the good replies at the front of `stream`, up to anything unusual; return the rest."""
