@@ -48,6 +48,11 @@ class FirstModel:
     shortcomings: tuple[str, ...]
 
     @property
+    def may_want_taps(self) -> bool:
+        """Whether more taps may mend what it lacks: what is missing in the model they do not."""
+        return bool(self.shortcomings) and self.fit.gap <= LARGEST_GAP
+
+    @property
     def sentence(self) -> str:
         """What was found, and in how many taps."""
         return (

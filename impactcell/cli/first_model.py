@@ -28,8 +28,8 @@ def fit_model(
 ) -> None:
     """Fit a cell's model to a campaign, or to the first taps of its own journal, and put it into service.
 
-    Where no number of taps is said, 30 are taken, and twice as many while they are not good enough and there
-    are more: whoever strikes further taps, as he is told, need say nothing else.
+    Where no number of taps is said, 30 are taken, and twice as many while more may help and there are more:
+    whoever strikes further taps, as he is told, need say nothing else.
 
     The model that it replaces is kept beside it, as `model accept` does. One that is not good enough is put
     into service only where that is asked for with `anyway`.
@@ -62,8 +62,9 @@ def _fit(config: CellConfig, campaign: Path | None, taps: int | None) -> FirstMo
         source, data = _taps(config, campaign, count)
         first = fit_first_model(data, config.name, source)
         has_more = campaign is None and taps is None and first.taps == count < MOST_TAPS
-        if not first.shortcomings or not has_more:
+        if not (first.may_want_taps and has_more):
             return first
+        print_note(f"{count} taps are not enough ({first.shortcomings[0]}); twice as many are fitted")
         count *= 2
 
 
