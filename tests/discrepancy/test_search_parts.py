@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from impactcell.discrepancy.data import MIN_HELD_OUT, MIN_TRAINING
-from impactcell.discrepancy.model import effect_coordinates
+from impactcell.discrepancy.data import MIN_HELD_OUT, MIN_TRAINING, POSITION
+from impactcell.discrepancy.model import effect_coordinates, fit_nominal
 from impactcell.discrepancy.search import (
     acceptance,
     between_shots,
@@ -25,6 +25,7 @@ from impactcell.discrepancy.search.candidate_fits import finalists, is_at_bound,
 from impactcell.discrepancy.search.conclusion import missing_shots
 from impactcell.discrepancy.search.indistinguishability import CandidateFit
 from impactcell.discrepancy.search.policy import POLICY
+from tests.discrepancy.test_convergence import context_of
 
 
 def test_the_error_that_shots_share_is_what_sizes_vary_by_beyond_chance() -> None:
@@ -335,3 +336,18 @@ def test_effects_that_the_factors_speak_for_are_fitted_with_those_within_shots_t
     assert len(between_shots._fits(context, evidence, ())) == 3
     p_values["friction_drift"] = p_values["stiction_ageing"] = 0.9
     assert between_shots._fits(context, evidence, ()) == []
+
+
+def test_what_is_alike_whichever_way_a_part_is_tapped_goes_with_no_direction() -> None:
+    """Places count along the tap: friction that grows with the speed holds back parts both ways."""
+    context = context_of("viscous_friction")
+    directions = {shot.direction for shot in context.problem.shots.items}
+    assert directions == {-1, 1}
+    evidence = context.test_model(fit_nominal(context.problem))
+    of_position = evidence.map.channel == POSITION
+    column = evidence.map.cell % len(evidence.map.columns)
+    mean, direction = (
+        float(evidence.map_scores.gain[of_position & (column == evidence.map.columns.index(name))].max())
+        for name in (residual_map.ALL, "direction")
+    )
+    assert mean > 20.0 * direction

@@ -1,7 +1,8 @@
 """Where model and measurement disagree: a map of phases against covariates, tested as one family.
 
 A cell of the map asks whether the residuals of one phase, on any channel and in any smooth shape along the
-phase, have a mean that is not zero (column `all`) or that changes with a covariate. The row `between_shots`
+phase, have a mean that is not zero (column `all`) or that changes with a covariate. Places count along the
+tap: what a part does too much of whichever way it is tapped is alike in all shots. The row `between_shots`
 asks the same of the friction factors. Every cell is a group of directions for `wild_bootstrap`.
 """
 
@@ -9,7 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.data import BETWEEN_SHOTS, CHANNELS, PHASES, IndexArray, PreparedCampaign
+from impactcell.discrepancy.data import (
+    BETWEEN_SHOTS,
+    CHANNELS,
+    FORCE,
+    PHASES,
+    IndexArray,
+    PreparedCampaign,
+)
 from impactcell.discrepancy.model import (
     DirectionProducts,
     Fit,
@@ -77,6 +85,7 @@ def map_directions(
     times = problem.shots.times
     phase = sample_phases(problem, trajectory)
     place = phase_positions(problem, phase, times)
+    along = np.repeat([float(shot.direction) for shot in problem.shots.items], problem.sizes)
     factors = standardised_covariates(problem, prepared)
     columns = (ALL, *factors)
     parts: list[DirectionProducts] = []
@@ -96,7 +105,8 @@ def map_directions(
                 continue
             for count, modulated in ((MEAN_KNOTS, False), (COVARIATE_KNOTS, True)):
                 for middle, hat in _hat_functions(place, in_channel, count):
-                    hat_products = direction_products(linearisation, hat)
+                    shape = hat if channel == FORCE else along * hat
+                    hat_products = direction_products(linearisation, shape)
                     for column, covariate in enumerate(columns):
                         if (column == 0) == modulated:
                             continue
