@@ -11,6 +11,7 @@ from impactcell.discrepancy.laws import covariates, finding, grammar, refit
 from impactcell.discrepancy.laws.condense import RankedForm
 from impactcell.discrepancy.laws.grammar import Shaped
 from impactcell.discrepancy.laws.law import LawParameter, write_law
+from impactcell.discrepancy.model.parameters import effect_coordinates
 from impactcell.physics.free_forms import FREE_FORMS
 
 
@@ -103,3 +104,21 @@ def test_a_wave_has_no_parts_to_be_tried_alone() -> None:
     fitted: Any = SimpleNamespace(law=law, ranked=ranked, fit=fit)
     nothing: Any = None
     assert refit._parts_alone(nothing, fitted) == []
+
+
+@pytest.mark.parametrize(("amplitude", "centre"), [(0.02, 0.0), (0.02, 1e-19), (0.0, 0.004)])
+def test_a_law_that_begins_at_nought_moves_on_the_scale_of_its_range(amplitude: float, centre: float) -> None:
+    """Something in the middle of the places gone through: the fit ended in a division by its typical 0."""
+    place = next(form for form in FREE_FORMS.values() if form.covariate == "position" and form.is_factor)
+    atom = next(one for one in grammar.ATOMS if grammar.CENTRE in one.shapes)
+    shapes = tuple(centre if shape is grammar.CENTRE else 0.002 for shape in atom.shapes)
+    ranked = RankedForm((Shaped((atom,), (shapes,)),), (amplitude,), 50.0, 40.0, np.zeros(2))
+    law = write_law(place, ranked, ((-0.01, 0.01),))
+    law.effect()
+    for coordinate, parameter in zip(
+        effect_coordinates(law.identifier, batches=1), law.parameters, strict=True
+    ):
+        start = coordinate.coordinate(parameter.first)
+        assert coordinate.value(start) == pytest.approx(parameter.first)
+        assert coordinate.lower <= start <= coordinate.upper
+        assert max(abs(coordinate.lower), abs(coordinate.upper)) <= 1e4

@@ -22,6 +22,8 @@ MIN_TIME_CONSTANT_SHARE = 0.02
 """Time constants shorter than this share of the typical one act at once and only make the plant stiff."""
 MIN_RECIPROCAL_SHARE = 1e-3
 """What vanishes at infinity is never looked for below this share of its typical value."""
+SMALLEST_SCALE = 1e-9
+"""A typical value below this share of its range is no scale: a place on the table may well be its middle."""
 MAX_ANGLE = 1e3
 """Range of an angle's coordinate: none, as a fit may go round."""
 
@@ -125,7 +127,17 @@ def _scaled(parameter: Parameter) -> tuple[str, float, float, float, float]:
     if parameter.kind is ParameterKind.PHASE:
         # An angle has no ends; a fit may go round.
         return "angle", typical, -MAX_ANGLE, MAX_ANGLE, start / typical
-    return "linear", typical, parameter.lower / typical, parameter.upper / typical, start / typical
+    scale = _linear_scale(parameter)
+    return "linear", scale, parameter.lower / scale, parameter.upper / scale, start / scale
+
+
+def _linear_scale(parameter: Parameter) -> float:
+    """Typical value of a parameter, or the largest of its range where that is 0 but for rounding."""
+    ends = [abs(end) for end in (parameter.lower, parameter.upper) if math.isfinite(end)]
+    largest = max(ends, default=0.0)
+    if abs(parameter.typical) > SMALLEST_SCALE * largest:
+        return abs(parameter.typical)
+    return largest or 1.0
 
 
 def parameter_columns(coordinates: tuple[Coordinate, ...], names: tuple[str, ...]) -> tuple[int, ...]:
