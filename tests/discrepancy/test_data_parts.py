@@ -224,6 +224,9 @@ def test_correlated_noise_that_nobody_stated_is_no_gap() -> None:
         (1.4 / 60.0, "position_m or velocity_mm_per_min", "1/60"),
         (1.4 * 60.0, "position_m or velocity_mm_per_min", "60"),
         (1.4e-3, "position_m or velocity_mm_per_min", "1e-3"),
+        (1.4 * 6e4, "position_m or velocity_mm_per_min", "6e+4"),
+        (1.4 / 6e4, "position_m or velocity_mm_per_min", "1/6e+4"),
+        (1.4e6, "position_m or velocity_mm_per_min", "1e+6"),
     ],
 )
 def test_a_wrong_unit_is_told_with_the_factor_between_units(value: float, columns: str, factor: str) -> None:

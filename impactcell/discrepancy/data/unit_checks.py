@@ -56,10 +56,11 @@ def check_units(ratios_of_shots: Iterable[Mapping[PlausibleRatio, float]]) -> No
 
 
 def _likely_factor(value: float, columns: str) -> str:
-    """Factor between units that is nearest to a ratio: a power of 1000, or of a velocity that of minutes."""
+    """Factor between units that is nearest to a ratio: a power of 1000, of a velocity also that of mm/min."""
     decades = math.log10(max(value, 1e-300))
     power = 3 * (round(decades / 3.0) or (1 if decades > 0.0 else -1))
     factors = {f"1e{power:+d}": float(power)}
     if "velocity" in columns:
-        factors |= {"60": math.log10(60.0), "1/60": -math.log10(60.0)}
+        minute, of_m_per_s = math.log10(60.0), math.log10(6e4)
+        factors |= {"60": minute, "1/60": -minute, "6e+4": of_m_per_s, "1/6e+4": -of_m_per_s}
     return min(factors, key=lambda factor: abs(factors[factor] - decades))
