@@ -230,8 +230,9 @@ def extended_model(result: DiscrepancyResult, data: Campaign, source: str, nomin
     )
     if data.excitation is not Excitation.TAP:
         return model
+    fitted = {shot.number for shot in result.prepared.shots}
     try:
-        return calibrated(model, data.shots)
+        return calibrated(model, [shot for shot in data.shots if shot.cycle in fitted])
     except (PredictionError, PhysicsError) as error:
         note = {**model.provenance, "not calibrated": str(error)}
         return replace(model, provenance=note)

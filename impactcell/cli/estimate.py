@@ -13,7 +13,7 @@ from typing import TextIO
 from impactcell.api.friction import calibrated_where_possible, with_masses
 from impactcell.campaign import Campaign, Excitation, from_contact, naming, read
 from impactcell.cli.paths import check_output
-from impactcell.discrepancy.data import check_campaign_units
+from impactcell.discrepancy.data import check_campaign_units, notes_of_unlike, without_unlike_shots
 from impactcell.errors import CampaignError, PredictionError
 from impactcell.features import Features, extract
 from impactcell.prediction import Model, estimate_from_features
@@ -71,6 +71,10 @@ def estimate(
     with naming(campaign):
         refuse_unusable(campaign_data, data_faults)
         check_campaign_units(campaign_data)
+    order = [shot.cycle for shot in campaign_data.shots]
+    campaign_data, unlike = without_unlike_shots(campaign_data, data_faults)
+    for note in notes_of_unlike(unlike):
+        print_note(note)
     if campaign_data.excitation is Excitation.FREE_SLIDE:
         rows = [
             (shot.cycle, _of_free_slide(shot, campaign_data.gravity_m_s2)) for shot in campaign_data.shots
@@ -78,6 +82,8 @@ def estimate(
     else:
         taps = with_masses([extract(shot) for shot in campaign_data.shots])
         rows = _of_taps(campaign_data, taps, cell)
+    rows += [(number, _no_estimate(told, told)) for number, told in unlike.items()]
+    rows.sort(key=lambda row: order.index(row[0]))
     if as_json:
         sys.stdout.write(_as_json(rows))
     elif output is None:
@@ -128,14 +134,18 @@ def _of_taps(
 
 
 def _of_free_slide(shot: Capture, gravity_m_s2: float) -> FrictionEstimate:
-    nothing = Coefficient(reason="a free slide shows mu_k only")
+    nothing = "a free slide shows mu_k only"
     try:
-        mu_k = free_slide_friction(shot, gravity_m_s2)
+        return replace(_no_estimate(nothing, nothing), mu_k=free_slide_friction(shot, gravity_m_s2))
     except PredictionError as fault:
-        mu_k = Coefficient(reason=str(fault))
+        return _no_estimate(nothing, str(fault))
+
+
+def _no_estimate(why_no_mu_s: str, why_no_mu_k: str) -> FrictionEstimate:
+    nothing = Coefficient(reason=why_no_mu_s)
     return FrictionEstimate(
-        mu_s=nothing, mu_k=mu_k, by_force=nothing, by_distance=nothing, combined=nothing,
-        estimator=Estimator.NONE, peak_force_n=math.nan, sliding_distance_m=math.nan,
+        mu_s=nothing, mu_k=Coefficient(reason=why_no_mu_k), by_force=nothing, by_distance=nothing,
+        combined=nothing, estimator=Estimator.NONE, peak_force_n=math.nan, sliding_distance_m=math.nan,
     )  # fmt: skip
 
 

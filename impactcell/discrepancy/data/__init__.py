@@ -1,5 +1,6 @@
 """What the workflow works on: shots and blocks, checked, grouped and split, and the noise floor."""
 
+from impactcell.discrepancy.data.campaign_checks import check_campaign_units, without_unlike_shots
 from impactcell.discrepancy.data.excitation import MIN_HELD_OUT, MIN_TRAINING, ExcitationStrategy
 from impactcell.discrepancy.data.free_slide import FreeSlide
 from impactcell.discrepancy.data.noise_floor import (
@@ -11,7 +12,6 @@ from impactcell.discrepancy.data.noise_floor import (
 from impactcell.discrepancy.data.phases import BETWEEN_SHOTS, PHASES, Trajectory
 from impactcell.discrepancy.data.prepared_campaign import (
     PreparedCampaign,
-    check_campaign_units,
     prepare,
     shot_set,
     split_held_out,
@@ -27,6 +27,7 @@ from impactcell.discrepancy.data.prepared_shots import (
     concatenate_shots,
     decimate,
 )
+from impactcell.discrepancy.data.shots_unlike import notes_of_unlike
 
 __all__ = [
     "BETWEEN_SHOTS",
@@ -48,10 +49,12 @@ __all__ = [
     "check_campaign_units",
     "concatenate_shots",
     "decimate",
+    "notes_of_unlike",
     "prepare",
     "replicate_spread",
     "sensor_noise",
     "shot_set",
     "split_held_out",
     "with_open_onset",
+    "without_unlike_shots",
 ]

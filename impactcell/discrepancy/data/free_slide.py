@@ -12,7 +12,9 @@ from impactcell.discrepancy.data.prepared_shots import POSITION, IndexArray, Pre
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio
 from impactcell.records import Capture, Channel
 
-DECELERATION_RATIO = PlausibleRatio(1e-4, 20.0, "the deceleration over gravity", "position_m or time_s")
+DECELERATION_RATIO = PlausibleRatio(
+    1e-4, 20.0, "the deceleration over gravity", "position_m or time_s", far=50.0
+)
 """Free of contact, friction decelerates at a fraction of g."""
 MIN_SAMPLES = 8
 """Samples of a slide from which on its curvature means anything."""

@@ -10,10 +10,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.campaign import Campaign, Coordinate, Excitation, from_contact
-from impactcell.discrepancy.data.driven import Driven
+from impactcell.campaign import Campaign, Excitation, from_contact
+from impactcell.discrepancy.data.campaign_checks import (
+    check_shot_units,
+    without_unlike_shots,
+)
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
-from impactcell.discrepancy.data.free_slide import FreeSlide
 from impactcell.discrepancy.data.noise_at_rest import NoiseAtRest, noise_at_rest
 from impactcell.discrepancy.data.prepared_shots import (
     POSITION,
@@ -22,27 +24,19 @@ from impactcell.discrepancy.data.prepared_shots import (
     ShotSet,
     concatenate_shots,
 )
-from impactcell.discrepancy.data.tap import Tap
-from impactcell.discrepancy.data.unit_checks import check_units
+from impactcell.discrepancy.data.shot_making import STRATEGIES, prepared_shot
+from impactcell.discrepancy.data.shots_unlike import notes_of_unlike
 from impactcell.errors import CampaignError
 from impactcell.features import noise_std, without_spikes
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
-from impactcell.records import Capture, Channel, Samples, sampling_step_s
+from impactcell.records import Capture, Channel
 
-STRATEGIES: dict[Excitation, ExcitationStrategy] = {
-    strategy.excitation: strategy for strategy in (Tap(), FreeSlide(), Driven())
-}
-"""Whom the workflow asks what an excitation is like, by its word in `campaign.yaml`."""
 MIN_SHOTS = 4
 """Fewer cannot be divided into shots to fit and one to hold out."""
 TIME_GAP_FACTOR = 5.0
 """A step of time this many times the median one is a gap in the record."""
-MIN_DWELL_S = 0.1
-"""Dwell [s] from which on stiction ages, as the law of `stiction_ageing` has it."""
 ROUNDING = 1e-6
 """Of a sampling step: a sample that comes one after contact is of that step."""
-NO_SAMPLES = np.empty(0)
-"""Samples of a channel that was not recorded."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +82,9 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     campaign, pretrigger = from_contact(whole)
     data_faults = inspect_campaign(campaign)
     refuse_unusable(campaign, data_faults)
-    notes = [*pretrigger, *notes_of(data_faults)]
+    campaign, unlike = without_unlike_shots(campaign, data_faults)
+    whole = replace(whole, shots=tuple(shot for shot in whole.shots if shot.cycle not in unlike))
+    notes = [*pretrigger, *notes_of(data_faults), *notes_of_unlike(unlike)]
     campaign = _without_spikes(campaign, notes)
     captures = strategy.cut(campaign, notes)
     if len(captures) < MIN_SHOTS:
@@ -104,12 +100,12 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         key = _settings(capture) if strategy.has_replicates else (float(number),)
         group = groups.setdefault(key, len(groups))
         batch = batches.index(capture.batch_id or "")
-        shots.append(_prepared_shot(strategy, capture, (record, len(campaign.shots)), batch, group))
+        shots.append(prepared_shot(strategy, capture, (record, len(campaign.shots)), batch, group))
     if any(capture.onset_std_s for capture, _ in captures):
         shots = list(map(_with_open_onset, shots))
     notes += strategy.missing_information(shots)
     notes += _time_gaps(shots)
-    _check_units(campaign, shots)
+    check_shot_units(campaign, shots)
     return PreparedCampaign(
         strategy,
         campaign.gravity_m_s2,
@@ -138,32 +134,6 @@ def _without_spikes(campaign: Campaign, notes: list[str]) -> Campaign:
     return replace(campaign, shots=tuple(cleaned))
 
 
-def check_campaign_units(campaign: Campaign) -> None:
-    """Notice a unit that is wrong by a large factor, as `prepare` does, however few the shots.
-
-    Raises
-    ------
-    CampaignError
-        With the columns whose unit to check.
-    """
-    strategy = STRATEGIES[campaign.excitation]
-    captures = strategy.cut(campaign, [])
-    shots = [_prepared_shot(strategy, capture, (1, 1), 0, 0) for capture, _ in captures]
-    _check_units(campaign, shots)
-
-
-def _check_units(campaign: Campaign, shots: Sequence[PreparedShot]) -> None:
-    strategy = STRATEGIES[campaign.excitation]
-    try:
-        check_units(strategy.unit_ratios(shot, campaign.gravity_m_s2) for shot in shots)
-    except CampaignError as error:
-        if campaign.coordinate is not Coordinate.ROTATION:
-            raise
-        raise CampaignError(
-            "what turns is no part that slides under its weight: give a base model (--base BASE.yaml)"
-        ) from error
-
-
 def split_held_out(prepared: PreparedCampaign, seed: int) -> tuple[IndexArray, IndexArray]:
     """Divide the shots into training and held-out ones: their indices, each in file order."""
     return prepared.excitation.split(prepared.shots, seed)
@@ -188,41 +158,6 @@ def _settings(capture: Capture) -> tuple[float, ...]:
     )
 
 
-def _prepared_shot(
-    strategy: ExcitationStrategy, capture: Capture, record_of: tuple[int, int], batch: int, group: int
-) -> PreparedShot:
-    record, records = record_of
-    dwell = math.log10(max(capture.dwell_s, MIN_DWELL_S)) if math.isfinite(capture.dwell_s) else math.nan
-    covariates = {
-        "shot": float(record),
-        "velocity": capture.velocity_m_s,
-        "mass": capture.mass_kg,
-        "direction": float(capture.direction),
-        "batch": float(batch),
-        "dwell": dwell,
-        "start": capture.start_m,
-    }
-    covariates |= {name: value for name, value in capture.covariates.items() if isinstance(value, float)}
-    channels = strategy.predicted_channels(capture)
-    return PreparedShot(
-        number=capture.cycle,
-        record=record,
-        records=records,
-        velocity_m_s=capture.velocity_m_s,
-        mass_kg=capture.mass_kg,
-        direction=capture.direction,
-        batch=batch,
-        dwell_s=capture.dwell_s,
-        start_m=capture.start_m,
-        group=group,
-        times=_channel_arrays(channels, "time_s"),
-        values=_channel_arrays(channels, "values"),
-        drive=strategy.drive(capture),
-        covariates=strategy.adjust_covariates(covariates),
-        sampling_step_s=sampling_step_s(capture),
-    )
-
-
 def with_open_onset(prepared: PreparedCampaign) -> PreparedCampaign:
     """Let first contact of every shot lie within a sampling step of t = 0."""
     return replace(prepared, shots=tuple(map(_with_open_onset, prepared.shots)))
@@ -243,15 +178,6 @@ def _with_open_onset(shot: PreparedShot) -> PreparedShot:
         values=(values[0], values[1], values[2]),
         onset_is_open=True,
     )
-
-
-def _channel_arrays(
-    channels: tuple[Channel | None, Channel | None, Channel | None], attribute: str
-) -> tuple[Samples, Samples, Samples]:
-    force, position, actuator = (
-        NO_SAMPLES if channel is None else getattr(channel, attribute) for channel in channels
-    )
-    return force, position, actuator
 
 
 def _varying_covariates(strategy: ExcitationStrategy, shots: Sequence[PreparedShot]) -> tuple[str, ...]:

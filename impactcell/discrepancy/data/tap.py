@@ -19,16 +19,25 @@ from impactcell.discrepancy.data.prepared_shots import (
     ShotSet,
 )
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio
-from impactcell.records import AT_THE_HALT_S, MM_PER_MIN, Capture, Channel, since_contact
+from impactcell.features.clipping import is_cut_off
+from impactcell.features.contact import MIN_CLIPPED_RUN
+from impactcell.records import AT_THE_HALT_S, MM_PER_MIN, Capture, Channel, Samples, since_contact
 
 SPEED_RATIO = PlausibleRatio(
-    0.05, 20.0, "the part's speed over the actuator's velocity", "position_m, time_s or velocity_mm_per_min"
-)
+    0.05, 20.0, "the part's speed over the actuator's velocity", "position_m, time_s or velocity_mm_per_min",
+    column_of_shot="velocity_mm_per_min", apart=2.0, far=20.0,
+)  # fmt: skip
 """The part leaves the actuator at one to two times its velocity, and slows down."""
 IMPULSE_RATIO = PlausibleRatio(
     0.02, 50.0, "the impulse of force_n over mass times velocity and friction's impulse", "force_n or mass_kg"
 )
 """The impulse of the contact gives the part about m v, and bears friction as long as contact lasts."""
+BALANCE_RATIO = PlausibleRatio(
+    0.02, 50.0, "the impulse of force_n over mass times the part's speed and friction's impulse",
+    "force_n or mass_kg", column_of_shot="mass_kg or force_n", apart=1.3, far=20.0,
+)  # fmt: skip
+"""The same by the part's own largest speed, which is within a few percent of one plant's whatever is struck:
+what tells the mass of a single shot."""
 TYPICAL_FRICTION = 0.2
 """Coefficient by which friction's impulse is reckoned: from 0.05, polymer, to 0.8, dry metal, it is within a
 factor of four, where a wrong unit makes a thousand."""
@@ -36,6 +45,8 @@ CONTACT_SHARE = 0.05
 """Force over its largest from which on there is contact."""
 MIDDLE_OF_PATH = (0.25, 0.75)
 """Shares of a part's path between which its speed is taken, however long a record goes on at rest."""
+WINDOW = 4
+"""A part's largest speed is that over one part in so many of the middle of its path, against noise."""
 MIN_SAMPLES = 8
 """Samples of a channel from which on its ratios mean anything."""
 RATIOS = (1.15, 1.5)
@@ -105,7 +116,7 @@ class Tap(ExcitationStrategy):
         return [note for is_lacking, note in lacks if is_lacking]
 
     def unit_ratios(self, shot: PreparedShot, gravity_m_s2: float) -> Mapping[PlausibleRatio, float]:
-        """Speed of the part over that of the actuator, impulse over momentum."""
+        """Speed of the part over that of the actuator, impulse over momentum by either speed."""
         time, position = shot.times[POSITION], shot.values[POSITION]
         if len(time) < MIN_SAMPLES:
             return {}
@@ -117,8 +128,11 @@ class Tap(ExcitationStrategy):
             force = np.maximum(shot.values[FORCE], 0.0)
             in_contact = (force > CONTACT_SHARE * force.max()).astype(np.float64)
             impulse, contact_s = (float(np.trapezoid(of, shot.times[FORCE])) for of in (force, in_contact))
-            speed_m_s = shot.velocity_m_s + TYPICAL_FRICTION * gravity_m_s2 * contact_s
-            ratios[IMPULSE_RATIO] = impulse / (shot.mass_kg * speed_m_s)
+            braked_m_s = TYPICAL_FRICTION * gravity_m_s2 * contact_s
+            ratios[IMPULSE_RATIO] = impulse / (shot.mass_kg * (shot.velocity_m_s + braked_m_s))
+            if not _is_clipped(shot.values[FORCE]):
+                largest_m_s = _largest_speed(time, path, max((end - begin) // WINDOW, 1))
+                ratios[BALANCE_RATIO] = impulse / (shot.mass_kg * (largest_m_s + braked_m_s))
         return ratios
 
     def plant_guesses(self, shots: Sequence[PreparedShot], gravity_m_s2: float) -> list[dict[str, float]]:
@@ -179,6 +193,18 @@ class Tap(ExcitationStrategy):
                 for batch in range(last + 1)
             ]
         return settings
+
+
+def _largest_speed(time: Samples, path: Samples, window: int) -> float:
+    """Largest speed over so many sampling steps [m/s]."""
+    return float(np.max((path[window:] - path[:-window]) / (time[window:] - time[:-window])))
+
+
+def _is_clipped(force: Samples) -> bool:
+    """Whether a force lacks the impulse above the end of its range."""
+    below = np.flatnonzero(np.concatenate([[True], force < force.max(), [True]]))
+    plateau = int(np.diff(below).max()) - 1
+    return plateau >= MIN_CLIPPED_RUN and is_cut_off(force, plateau)
 
 
 def _is_recorded(shots: Sequence[PreparedShot], channel: int) -> bool:

@@ -20,12 +20,20 @@ class PlausibleRatio:
     name : str
     columns : str
         Columns whose unit may be wrong.
+    column_of_shot : str
+        Column that is wrong where a shot's ratio alone is not like the others', its other ratios are.
+    apart, far : float
+        Factor between a shot's ratio and those of the campaign beyond which it is not like them: where shots
+        of the same settings have another one, and wherever it is. Infinite where it is not judged by shot.
     """
 
     low: float
     high: float
     name: str
     columns: str
+    column_of_shot: str = ""
+    apart: float = math.inf
+    far: float = math.inf
 
 
 def check_units(ratios_of_shots: Iterable[Mapping[PlausibleRatio, float]]) -> None:
@@ -50,12 +58,12 @@ def check_units(ratios_of_shots: Iterable[Mapping[PlausibleRatio, float]]) -> No
         if not ratio.low < median < ratio.high:
             message = (
                 f"{ratio.name} is {median:.3g}, where about 1 is possible: check the unit of {ratio.columns} "
-                f"(off by a factor of about {_likely_factor(median, ratio.columns)})"
+                f"(off by a factor of about {likely_factor(median, ratio.columns)})"
             )
             raise CampaignError(message)
 
 
-def _likely_factor(value: float, columns: str) -> str:
+def likely_factor(value: float, columns: str) -> str:
     """Factor between units that is nearest to a ratio: a power of 1000, of a velocity also that of mm/min."""
     decades = math.log10(max(value, 1e-300))
     power = 3 * (round(decades / 3.0) or (1 if decades > 0.0 else -1))

@@ -10,7 +10,7 @@ from typing import Final
 
 from impactcell.discrepancy.report.german_held_numbers import held_number, key_of
 from impactcell.discrepancy.report.german_words import phrase, term_name
-from impactcell.german.data_faults import german_data_fault
+from impactcell.german.data_faults import german_data_fault, german_message
 from impactcell.german.findings import with_decimal_commas
 from impactcell.physics.effect_names import as_title, identifier_of
 
@@ -28,7 +28,39 @@ DOUBTED: Final = {
 """What may be otherwise than a record has it."""
 LIKE: Final = {"velocity": "", "mass": "; eine Kraft mit falschem Maßstab sähe ebenso aus"}
 """What looks the same."""
+RATIOS: Final = {
+    "the part's speed over the actuator's velocity":
+        "die Geschwindigkeit des Teils durch die des Antriebs",
+    "the impulse of force_n over mass times the part's speed and friction's impulse":
+        "der Impuls von force_n durch Masse mal Geschwindigkeit des Teils und Reibungsimpuls",
+    "the deceleration over gravity": "die Verzögerung durch die Schwerebeschleunigung",
+}  # fmt: skip
+"""What of a shot may be unlike the others."""
+
+
+def _left_out(match: re.Match[str]) -> str:
+    """Say why a shot is left out, and which others are; empty where no words are known."""
+    why, others = match["why"], match["others"]
+    if unlike := re.fullmatch(
+        r"(.+) is (\S+) times that of the other shots: check its (.+) \(off by a factor of about (\S+)\)", why
+    ):
+        if unlike[1] not in RATIOS:
+            return ""
+        said = (
+            f"{RATIOS[unlike[1]]} ist das {unlike[2]}-Fache dessen der anderen Stöße: "
+            f"{unlike[3].replace(' or ', ' oder ')} prüfen (um etwa den Faktor {unlike[4]} daneben)"
+        )
+    elif pulls := re.fullmatch(r"its force_n pulls with (\S+) N, .*", why):
+        said = f"force_n zieht mit {pulls[1]} N, wo ein Kontakt nur drückt: das Vorzeichen umkehren"
+    else:
+        said = german_message(why) or ""
+    more = f"; aus gleichem Grund auch {others}" if others else ""
+    return f"Stoß {match['shot']} ist ausgelassen: {said}{more}." if said else ""
+
+
 NOTES: Final[Patterns] = (
+    (r"Shot (?P<shot>\d+) is left out: (?P<why>.+?)(?:; for the like so are (?P<others>[\d, ]+))?\.",
+     _left_out),
     (r"Data, .*", lambda m: german_data_fault(m[0]) or ""),
     (r"The noise of (\w+) is not stated; (\S+ \S+) was .* at rest ([^,]+), (\S+) times .* state (\w+) of .*",
      lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus Messwerten in Ruhe "

@@ -106,6 +106,27 @@ def test_one_bad_shot_is_a_row_that_says_why(tmp_path: Path) -> None:
     assert all(row["quality"] != "bad" for row in found if row["shot"] != "4")
 
 
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"velocity_m_s": 4500 / 6e4 / 6e4}, "check its velocity_mm_per_min (off by a factor of about 6e+4)"),
+        ({"mass_kg": 12.6}, "check its mass_kg or force_n (off by a factor of about 1.5)"),
+    ],
+)
+def test_a_shot_whose_setting_is_wrong_does_not_spoil_the_others(
+    tmp_path: Path, change: dict[str, float], told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shots = captures(taps())
+    shots[8] = replace(shots[8], **change)  # type: ignore[arg-type]  # of 4500 mm/min and 18.9 kg
+    estimate(campaign(tmp_path / "c", shots), None, tmp_path / "out.csv")
+    found = rows(tmp_path / "out.csv")
+    assert [int(row["shot"]) for row in found] == list(range(1, 17))
+    assert (found[8]["quality"], found[8]["mu_k_quality"], found[8]["mu_s"]) == ("bad", "bad", "")
+    assert found[8]["reason"].endswith(told)
+    assert all(row["quality"] == "good" for row in found if row["shot"] != "9")
+    assert "Shot 9 is left out: " in capsys.readouterr().err
+
+
 def test_free_slides_show_mu_k_only(tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     times = np.arange(80) / 148.0
