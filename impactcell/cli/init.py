@@ -26,11 +26,12 @@ from impactcell.prediction import PROVISIONAL, Model
 from impactcell.prediction.model import Prior
 from impactcell.process.console import print_note, print_result
 from impactcell.process.shipped import shipped_config
+from impactcell.records.plausible_range import STROKE
 from impactcell.settings import read_cell, read_register_map
 from impactcell.settings.fields import cell_name, module_host
 from impactcell.settings.judgement import judge_cell
 from impactcell.settings.model_file import write_model
-from impactcell.settings.plausible_tap import FRICTION, MASS, STROKE, VELOCITY
+from impactcell.settings.plausible_tap import FRICTION, MASS, VELOCITY
 
 PROVISIONAL_STIFFNESS: Final = 6.5e5
 """k of the paper's prototype, N/m: a beginning where nothing was measured."""

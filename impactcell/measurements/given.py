@@ -14,6 +14,7 @@ from impactcell.measurements.recognition import CHANNELS, VOCABULARY, ColumnMean
 from impactcell.measurements.taps import NO_TRIGGER
 from impactcell.measurements.units import Dimension, parse_unit
 from impactcell.process import yaml_loader
+from impactcell.records.plausible_range import STROKE
 
 CONSTANTS: dict[str, tuple[tuple[Dimension, ...], str]] = {
     "mass": ((Dimension.MASS, Dimension.INERTIA), "18.9 kg"),
@@ -224,4 +225,6 @@ def _constant(key: str, text: str, faults: list[str]) -> float:
     number = value * unit.factor
     if number == 0.0 or (number < 0.0 and key != "direction"):
         faults.append(f"{key} is {text!r}; it has to be positive")
+    elif key == "stroke" and unit.dimension is Dimension.LENGTH and (doubt := STROKE.doubt(1e3 * number)):
+        faults.append(f"{key} is {text!r}: {doubt}")
     return number

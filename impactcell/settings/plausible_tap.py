@@ -1,51 +1,14 @@
 """What of a cell is hardly meant as it stands: a mass in grams, a stiffness in N/mm, taps without motion."""
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import Final
 
 from impactcell.records import MM_PER_MIN
+from impactcell.records.plausible_range import STROKE, PlausibleRange
 from impactcell.settings.cells import CellConfig
 
-
-@dataclass(frozen=True, slots=True)
-class PlausibleRange:
-    """Where a quantity of a tap lies, and what else it may have been said in.
-
-    Attributes
-    ----------
-    name, unit : str
-    low, high : float
-        Our choice: some two orders of magnitude to either side of the paper's prototype.
-    others : mapping
-        Other units by what one of them is in `unit`.
-    """
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    others: Mapping[str, float]
-
-    def doubt(self, value: float) -> str:
-        """Say that a value is hardly meant, and the unit in which it would be; empty where it may be."""
-        if self.low <= value <= self.high or not math.isfinite(value):
-            return ""
-        unit = f" {self.unit}" if self.unit else ""
-        way_out = "check its unit"
-        for other, factor in self.others.items():
-            if self.low <= factor * value <= self.high:
-                way_out = f"if that was meant in {other}, write {factor * value:g}"
-                break
-        return (
-            f"{self.name} of {value:g}{unit} is hardly meant, where taps have {self.low:g} to "
-            f"{self.high:g}{unit}: {way_out}"
-        )
-
-
 MASS: Final = PlausibleRange("a mass", "kg", 0.01, 1e3, {"g": 1e-3, "t": 1e3})
-STROKE: Final = PlausibleRange("a stroke", "mm", 0.01, 100.0, {"m": 1e3, "µm": 1e-3})
 VELOCITY: Final = PlausibleRange(
     "a velocity", "mm/min", 60.0, 6e4, {"mm/s": 60.0, "m/min": 1e3, "m/s": 1.0 / MM_PER_MIN}
 )

@@ -35,6 +35,14 @@ FAULTS: Final = (
         "{key} ist „{value}“, muss aber eine Zahl sein; berichtigen, oder damit umrechnen und das Attribut "
         "entfernen",
     ),
+    FaultPattern(
+        r"stroke is (['\"]).+\2: a stroke of (?P<value>\S+) mm is hardly meant, where taps have "
+        r"(?P<low>\S+) to (?P<high>\S+) mm: .*",
+        "a stroke of {value} mm is hardly meant, where taps have {low} to {high} mm; correct it in the form "
+        "below",
+        "ein Hub von {value} mm ist kaum gemeint, Stöße haben {low} bis {high} mm; unten im Formular "
+        "berichtigen",
+    ),
     FaultPattern(r"has no rows", "has no rows", "hat keine Zeilen"),
     FaultPattern(
         r"neither position nor force was found among (?P<names>.+); name them with --column .*",

@@ -109,6 +109,11 @@ def test_start_position_and_covariates_are_kept(tmp_path: Path) -> None:
         ("format: 1\nexcitation: tap\ngravity_m_s2: heavy\n", 3, "gravity_m_s2 is 'heavy'"),
         ("format: 1\nexcitation: tap\ngravity_m_s2: .nan\n", 3, "positive number"),
         ("format: 1\nexcitation: tap\nactuator: {stroke_m: -1}\n", 3, "actuator.stroke_m is '-1'"),
+        (
+            "format: 1\nexcitation: tap\nactuator:\n  stroke_m: 1.5\n",
+            4,
+            "actuator.stroke_m: a stroke of 1.5 m is hardly meant, where taps have 1e-05 to 0.1 m: if that",
+        ),
         ("format: 1\nexcitation: tap\nsensors: {sound: {}}\n", 3, "unknown key 'sound'"),
         ("format: 1\nexcitation: tap\nsensors:\n  force: {noise_std_n: 0}\n", 4, "positive number"),
         ("format: 1\nexcitation: tap\nformat: 1\n", 3, "appears twice"),

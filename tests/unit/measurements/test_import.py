@@ -542,6 +542,13 @@ def test_two_masses_beside_the_columns_are_refused_unless_one_is_given(tmp_path:
     assert not faults
 
 
+def test_a_stroke_that_no_actuator_has_is_refused() -> None:
+    with pytest.raises(MeasurementError, match=r"stroke of 1500 mm is hardly meant, where .* 0.01 to 100 mm"):
+        read_given({"constants": ["stroke=1.5m"]})
+    assert read_given({"constants": ["stroke=90deg"]}).constants["stroke"] == pytest.approx(np.pi / 2.0)
+    assert read_given({"constants": ["stroke=100mm"]}).constants["stroke"] == pytest.approx(0.1)
+
+
 @pytest.mark.parametrize("text", ["mass=18,900kg", "stroke=1,500 mm", "mass=1,5kg"])
 def test_a_comma_in_what_is_set_is_neither_a_decimal_mark_nor_a_separator(text: str) -> None:
     with pytest.raises(MeasurementError, match=r"with its unit and a decimal point, without separators"):

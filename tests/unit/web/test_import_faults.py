@@ -46,6 +46,13 @@ def faults_of(directory: Path, text: str, given: Given = NOTHING_GIVEN) -> list[
     return str(error.value).splitlines()
 
 
+def test_a_stroke_that_no_actuator_has_is_said_in_both_languages() -> None:
+    with pytest.raises(MeasurementError) as error:
+        read_given({"constants": ["stroke=1.5 m"]})
+    assert page_fault(str(error.value), "en")[1].endswith("correct it in the form below")
+    assert page_fault(str(error.value), "de")[1].startswith("ein Hub von 1500 mm ist kaum gemeint")
+
+
 @pytest.mark.parametrize("case", FILES)
 def test_a_fault_is_said_without_options_in_both_languages(tmp_path: Path, case: str) -> None:
     faults = faults_of(tmp_path, FILES[case])

@@ -1,0 +1,46 @@
+"""Where a quantity of a tap lies, and what is said of one that is hardly meant."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+
+@dataclass(frozen=True, slots=True)
+class PlausibleRange:
+    """Where a quantity of a tap lies, and what else it may have been said in.
+
+    Attributes
+    ----------
+    name, unit : str
+    low, high : float
+        Our choice: some two orders of magnitude to either side of the paper's prototype.
+    others : mapping
+        Other units by what one of them is in `unit`.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    others: Mapping[str, float]
+
+    def doubt(self, value: float) -> str:
+        """Say that a value is hardly meant, and the unit in which it would be; empty where it may be."""
+        if self.low <= value <= self.high or not math.isfinite(value):
+            return ""
+        unit = f" {self.unit}" if self.unit else ""
+        way_out = "check its unit"
+        for other, factor in self.others.items():
+            if self.low <= factor * value <= self.high:
+                way_out = f"if that was meant in {other}, write {factor * value:g}"
+                break
+        return (
+            f"{self.name} of {value:g}{unit} is hardly meant, where taps have {self.low:g} to "
+            f"{self.high:g}{unit}: {way_out}"
+        )
+
+
+STROKE: Final = PlausibleRange("a stroke", "mm", 0.01, 100.0, {"m": 1e3, "µm": 1e-3})
+STROKE_M: Final = PlausibleRange("a stroke", "m", 1e-5, 0.1, {"mm": 1e-3, "µm": 1e-6})
+"""The same for a stroke that is written in metres."""
