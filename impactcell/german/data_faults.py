@@ -13,6 +13,7 @@ KINDS: Final = {
     "constant channel": "konstanter Kanal",
     "no motion": "keine Bewegung",
     "presliding only": "nur Vorgleiten",
+    "copy": "Kopie",
 }
 """Kinds of what is wrong with data."""
 CHANNELS: Final = {"force": "Kraft", "position": "Position", "actuator": "Antrieb"}
@@ -45,6 +46,9 @@ MESSAGES: Final[Sequence[tuple[str, str | Callable[[re.Match[str]], str]]]] = (
      lambda m: f"{CHANNELS[m[1]]} ist {m[2]} ms später aufgezeichnet als {CHANNELS[m[3]]} ({m[4]} Stöße): "
      "Filter und Uhr dieses Kanals prüfen, bevor ein Gesetz schuld ist (impactcell import --delay verschiebt "
      "ihn)"),
+    (r"its samples are those of shot (\d+), .*",
+     (r"seine Messwerte sind die von Stoß \1, samt Rauschen: eine Aufzeichnung zählt doppelt; eine davon "
+      "weglassen, oder dem Stoß seine eigenen geben")),
     (r"the force at rest goes from (\S+) N to (\S+) N over (\d+) shots: .*",
      r"die Kraft in Ruhe geht von \1 N auf \2 N über \3 Stöße: Sensor tarieren, warm werden lassen"),
 )  # fmt: skip

@@ -23,7 +23,7 @@ from impactcell.measurements.scalars import said_beside
 from impactcell.measurements.table import Table
 from impactcell.measurements.taps import taps_of
 from impactcell.measurements.units import Dimension
-from impactcell.quality import Fault, inspect_campaign, notes_of, refuse_unusable
+from impactcell.quality import Fault, copies, inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import MM_PER_MIN, Capture, Channel, Samples
 
 STANDARD_GRAVITY_M_S2 = 9.81
@@ -74,6 +74,7 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     else:
         captures = [_whole(number, record, given) for number, record in enumerate(records, 1)]
         notes += _of_taps_only(given)
+    notes += (of_copies := _of_copies(records))
     is_swapped = looks_swapped(records)
     notes += [SWAPPED] if is_swapped else []
     if all(math.isnan(capture.mass_kg) for capture in captures):
@@ -92,6 +93,8 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
         coordinate=coordinate,
     )
     data_faults = inspect_campaign(campaign)
+    if of_copies:
+        data_faults = tuple(one for one in data_faults if one.fault is not Fault.COPY)
     if coordinate is Coordinate.ROTATION:  # whether it swings back by its weight the base model says
         data_faults = tuple(one for one in data_faults if one.fault is not Fault.PRESLIDING_ONLY)
     try:
@@ -113,6 +116,15 @@ def write_campaign(tables: Sequence[Table], mapping: Mapping, directory: Path) -
     imported = make_campaign(tables, mapping)
     write_directory(imported.campaign, directory)
     return imported
+
+
+def _of_copies(records: Sequence[Record]) -> list[str]:
+    """Tell records that have the samples of another: the files, where each is one."""
+    return [
+        f"{records[place].place}: has the samples of {records[first].place}, noise and all, and counts as "
+        f"shots of its own; where it is a copy, leave it out"
+        for place, first in copies([list(record.values.values()) for record in records])
+    ]
 
 
 def _without_mass(coordinate: Coordinate) -> str:

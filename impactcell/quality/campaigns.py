@@ -11,6 +11,7 @@ from impactcell.campaign.contents import CHANNELS
 from impactcell.errors import CampaignError
 from impactcell.numerics.spikes import noise_of
 from impactcell.quality.channel_faults import channel_faults
+from impactcell.quality.copies import copies
 from impactcell.quality.data_fault import DataFault, Fault
 from impactcell.quality.motion_faults import LATE_STEPS, lateness_s, slides
 from impactcell.records import Capture, Samples
@@ -39,6 +40,7 @@ def inspect_campaign(campaign: Campaign) -> tuple[DataFault, ...]:
         motion = slides(shot, "rad" if campaign.coordinate is Coordinate.ROTATION else "m")
         if motion is not None:
             data_faults.append(motion)
+    data_faults += _copied(campaign.shots)
     if campaign.excitation is Excitation.TAP:
         data_faults += _late(campaign.shots)
         data_faults += _drift(campaign.shots)
@@ -76,6 +78,23 @@ def refuse_unusable(campaign: Campaign, data_faults: Sequence[DataFault]) -> Non
     if campaign.shots and all(shot.cycle in faulty for shot in campaign.shots):
         first = unusable[0]
         raise CampaignError(f"shot {first.shot}: {first.message} (and so in all {len(campaign.shots)} shots)")
+
+
+def _copied(shots: Sequence[Capture]) -> list[DataFault]:
+    """Tell shots whose samples are those of another."""
+    channels = [
+        [channel.values for channel in (shot.force, shot.position) if channel is not None] for shot in shots
+    ]
+    return [
+        DataFault(
+            Fault.COPY,
+            "position" if shots[place].force is None else "force",
+            f"its samples are those of shot {shots[first].cycle}, noise and all: one record counts twice; "
+            f"leave one of them out, or give the shot its own trace",
+            shots[place].cycle,
+        )
+        for place, first in copies(channels)
+    ]
 
 
 def _late(shots: Sequence[Capture]) -> list[DataFault]:

@@ -15,6 +15,7 @@ class Fault(enum.StrEnum):
     CONSTANT = "constant channel"
     NO_MOTION = "no motion"
     PRESLIDING_ONLY = "presliding only"
+    COPY = "copy"
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from impactcell.errors import CampaignError
 from impactcell.features import without_spikes
 from impactcell.quality import UNUSABLE, DataFault, Fault
 
-TELLING = (*UNUSABLE, Fault.CLIPPING, Fault.DROPOUTS)
+TELLING = (*UNUSABLE, Fault.COPY, Fault.CLIPPING, Fault.DROPOUTS)
 """Faults of a record that say why a shot is unlike the others, better than a column to check."""
 
 

@@ -53,6 +53,9 @@ GERMAN: Final = {
     r"(.+) is (\S+), where about 1 is possible: check the unit of (.+) or (\S+) "
     r"\(off by a factor of about (\S+)\); it will be refused as it stands":
         r"Einheit prüfen: \3 oder \4 (um etwa den Faktor \5 daneben); so wird es später abgelehnt",
+    r"(.+): has the samples of (.+), noise and all, and counts as shots of its own; .*":
+        r"\1: hat die Messwerte von \2, samt Rauschen, und zählt als eigene Stöße; ist es eine Kopie, "
+        "weglassen",
     r"no position was recorded: such taps tell mu_s by peak force and the model of a cell, .*":
         "keine Position aufgezeichnet: solche Stöße zeigen mu_s an der Spitzenkraft und mit dem Modell einer "
         "Zelle, von sich aus keines",

@@ -243,6 +243,19 @@ def test_the_verb_shows_what_it_guessed_and_writes(
         run_verb(["import", *named])
 
 
+def test_a_file_with_the_samples_of_another_is_told_and_kept(files: list[Path]) -> None:
+    copy = files[1].with_name(f"{files[1].stem} (2){files[1].suffix}")
+    copy.write_bytes(files[1].read_bytes())
+    tables = [table for file in (*files, copy) for table in read_tables(file)]
+    constants = ["mass=12.6kg", "velocity=4000mm/min", "stroke=1.5mm"]
+    imported = make_campaign(tables, guess(tables, read_given({"constants": constants})))
+    assert len(imported.campaign.shots) == len(files) + 1
+    (note,) = (note for note in imported.notes if "noise and all" in note)
+    assert note.startswith(f"{copy}: has the samples of {files[1]}, noise and all")
+    language, said = page_note(note, "de")
+    assert (language, said.endswith("ist es eine Kopie, weglassen")) == ("de", True)
+
+
 def test_a_unit_that_is_wrong_by_far_is_told_before_other_verbs_refuse_it(
     files: list[Path], capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -238,3 +238,13 @@ def test_the_noise_that_is_shown_and_that_which_a_fit_weighs_by_agree_but_for_ex
     for values, least in ((coarse, 0.02 / math.sqrt(12.0)), (exact, 0.0)):
         assert noise_of(values) == 0.0
         assert white_noise_std(values) > 0.99 * least
+
+
+def test_a_shot_with_the_samples_of_another_is_told(shots: tuple[Capture, ...]) -> None:
+    copied = replace(shots[1], cycle=9)
+    found = inspect_campaign(campaign((*shots, copied)))
+    assert [(one.fault, one.shot) for one in found] == [(Fault.COPY, 9)]
+    assert notes_of(found)[0].startswith("Data, copy: shot 9: its samples are those of shot 2, noise and all")
+    flat = Channel(np.arange(200) * 1e-4, np.zeros(200))
+    exact = tuple(replace(shot, force=flat, position=flat) for shot in shots[:2])
+    assert not any(one.fault is Fault.COPY for one in inspect_campaign(campaign(exact)))
