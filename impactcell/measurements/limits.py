@@ -53,7 +53,7 @@ class Limits:
                 f"are read; export the stretch or the channels that are needed"
             )
         if status.st_size == 0:
-            raise MeasurementError(f"{path}: is empty")
+            raise MeasurementError(f"{path}: is empty; leave the file out, or record it again")
         return status.st_size
 
     def check_shape(self, place: str, rows: int, columns: int, cells_before: int = 0) -> int:

@@ -14,6 +14,7 @@ from impactcell.measurements.dialect import DELIMITERS, Dialect, decode, detect,
 from impactcell.measurements.labview import is_labview, read_labview
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.moments import read_moments
+from impactcell.measurements.names_alone import refuse_names_alone
 from impactcell.measurements.table import Lines, MeasuredColumn, Table, unique_names
 from impactcell.measurements.text_layout import Layout, find_layout, is_comment
 from impactcell.measurements.twincat_scope import is_scope_export, read_scope_export
@@ -35,6 +36,7 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
         return read_labview(source, lines, limits, given.decimal)
     if is_scope_export(lines):
         return read_scope_export(source, lines, limits, given.decimal)
+    refuse_names_alone(lines, source)
     delimiter, decimal, how = detect([line for line in lines if not is_comment(line)], given)
     layout = find_layout(lines, source, delimiter, decimal)
     limits.check_shape(source, len(lines) - layout.first_row, len(layout.names))
@@ -59,7 +61,7 @@ def _lines(text: str, source: str, limits: Limits) -> list[str]:
     while lines and not lines[-1].strip(" \t\x1a"):
         lines.pop()
     if not lines:
-        raise MeasurementError(f"{source}: is empty")
+        raise MeasurementError(f"{source}: is empty; leave the file out, or record it again")
     if '"' in text[:100_000]:
         lines = _joined(lines)
     limits.check_shape(source, len(lines), 1)

@@ -43,6 +43,16 @@ FAULTS: Final = (
         "ein Hub von {value} mm ist kaum gemeint, Stöße haben {low} bis {high} mm; unten im Formular "
         "berichtigen",
     ),
+    FaultPattern(
+        r"is empty; leave the file out, .*",
+        "is empty; leave the file out, or record it again",
+        "ist leer; die Datei weglassen oder neu aufzeichnen",
+    ),
+    FaultPattern(
+        r"has no samples below its names; .*",
+        "has no samples below its names; leave the file out, or record it again",
+        "hat unter den Namen keine Messwerte; die Datei weglassen oder neu aufzeichnen",
+    ),
     FaultPattern(r"has no rows", "has no rows", "hat keine Zeilen"),
     FaultPattern(
         r"neither position nor force was found among (?P<names>.+); name them with --column .*",

@@ -138,7 +138,13 @@ def test_dates_and_clock_times_become_seconds(tmp_path: Path) -> None:
         ("a;b;c;d\n" + rows(40, "{0};{1};{0}"), ":1: 4 cells where the rows below have 3"),
         ("t;F\n" + rows(40).replace(";21\n", ";1_000\n"), ":12: column 'F': '1_000' is not a number"),
         ("nothing here\nat all\n", "no table of numbers"),
-        ("\n\n \n", "is empty"),
+        ("\n\n \n", "is empty; leave the file out, or record it again"),
+        (
+            "Messung 5\nMasse: 18,9 kg\nVorschub: 3000 mm/min\n\nZeit [ms];Kraft [N];Weg [mm]\n",
+            ":5: has no samples below its names; leave the file out",
+        ),
+        ("Messung;5\nDatum;2026-01-07\nt [s];F [N];x [m]\n", ":3: has no samples below its names"),
+        ("time_s,force_n,position_m", ":1: has no samples below its names"),
     ],
 )
 def test_faults_name_their_line(tmp_path: Path, text: str, told: str) -> None:
@@ -201,7 +207,7 @@ def test_ten_thousand_columns_are_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("content", "told"),
-    [(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" * 9, "is neither text nor"), (b"", "is empty")],
+    [(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" * 9, "is neither text nor"), (b"", "is empty; leave the file out")],
 )
 def test_what_is_no_text_is_refused(tmp_path: Path, content: bytes, told: str) -> None:
     path = tmp_path / "a.csv"

@@ -53,6 +53,24 @@ def test_a_stroke_that_no_actuator_has_is_said_in_both_languages() -> None:
     assert page_fault(str(error.value), "de")[1].startswith("ein Hub von 1500 mm ist kaum gemeint")
 
 
+@pytest.mark.parametrize(
+    ("text", "german"),
+    [
+        ("", "ist leer; die Datei weglassen oder neu aufzeichnen"),
+        ("Zeit [ms];Kraft [N]\n", "hat unter den Namen keine Messwerte; die Datei weglassen"),
+    ],
+)
+def test_a_file_without_samples_is_said_in_both_languages(tmp_path: Path, text: str, german: str) -> None:
+    path = tmp_path / "x.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(MeasurementError) as error:
+        read_tables(path)
+    fault = str(error.value).replace(str(path), "x.csv")
+    assert page_fault(fault, "en") == ("en", fault)
+    language, said = page_fault(fault, "de")
+    assert (language, german in said) == ("de", True)
+
+
 @pytest.mark.parametrize("case", FILES)
 def test_a_fault_is_said_without_options_in_both_languages(tmp_path: Path, case: str) -> None:
     faults = faults_of(tmp_path, FILES[case])
