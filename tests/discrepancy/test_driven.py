@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from impactcell.discrepancy.data.campaign_checks import check_campaign_units
 from impactcell.discrepancy.data.driven_blocks import cut_blocks, smoothed_velocity
 from impactcell.discrepancy.data.measured_drive import (
     SmoothedDrive,
@@ -12,7 +13,7 @@ from impactcell.discrepancy.data.measured_drive import (
     position_response,
     smooth_drive,
 )
-from impactcell.discrepancy.data.prepared_campaign import check_campaign_units, prepare, shot_set
+from impactcell.discrepancy.data.prepared_campaign import prepare, shot_set
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError
