@@ -38,6 +38,7 @@ def profile_parameters(
     Along such a coordinate the others are refitted as far as the cost rises by no more than the squared
     quantile of the intervals (profile likelihood; Venzon and Moolgavkar 1988); their intervals hold those of
     the optimum and of both ends. A coordinate whose interval is all its range is as uncertain as it moves.
+    A penalty is that of the fit, shape (p, p).
     """
     estimates = estimate_parameters(model, linearisation, shared_error, penalty)
     quantile = interval_quantile(model, linearisation, penalty)
