@@ -30,9 +30,8 @@ def lock_journal(path: Path) -> IO[str]:
     check_file(path)
     file = Path(os.path.realpath(path))
     lock_file = file.with_name(f"{file.name}.lock")
-    if (
-        not lock_file.exists()
-    ):  # with it, somebody in this process may hold locks that a look at it would drop
+    # With a lock file somebody in this process may hold locks that a look at the journal would drop.
+    if not lock_file.exists():
         check_header(path)
     flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NONBLOCK
     lock = os.fdopen(os.open(lock_file, flags, 0o644), "w")

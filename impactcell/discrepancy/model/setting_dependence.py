@@ -4,16 +4,14 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
 
 from impactcell.discrepancy.model.contact_moment import MIN_STEP_SHARE
 from impactcell.discrepancy.model.least_squares import Fit
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.discrepancy.model.shot_parameters import STD_OF_TOLD
+from impactcell.discrepancy.model.told_settings import CHANCE, correlation_chance
 from impactcell.records import Samples
 
-CHANCE = 1e-3
-"""Chance of the closest correlation with any covariate below which a number goes with it."""
 LEAST_SHARE = 0.1
 """Of the error with which a setting is known: less than this that goes with a covariate does not matter."""
 _WORDS = {
@@ -26,11 +24,10 @@ _WORDS = {
 def dependence_notes(problem: Problem, fitted: Fit, names: Sequence[str]) -> tuple[str, ...]:
     """Say which of the shots' own numbers, by names, go with something that differs among the shots.
 
-    The correlation r of n shots is tested by t = r sqrt((n - 2) / (1 - r²)) (Student), the chance shared
-    among the covariates.
+    By the chance of the closest correlation, shared among the covariates.
     """
     notes = []
-    for name in (name for name in names if name in _WORDS):
+    for name in names:
         found = _closest(problem, getattr(fitted.shot_parameters, name), _least(problem, name))
         if found is not None:
             covariate, r = found
@@ -59,6 +56,5 @@ def _closest(problem: Problem, values: Samples, least: float) -> tuple[str, floa
         if np.isfinite(row).all() and float(np.ptp(row)) > 0.0:
             found.append((float(np.corrcoef(row, values)[0, 1]), name))
     r, name = max(found, key=lambda one: abs(one[0]), default=(0.0, ""))
-    t = abs(r) * math.sqrt((count - 2) / max(1.0 - r * r, 1e-15))
-    is_chance = len(found) * 2.0 * float(stats.t.sf(t, count - 2)) > CHANCE
+    is_chance = len(found) * correlation_chance(r, count - 1) > CHANCE
     return None if is_chance or abs(r) * float(values.std()) < least else (name, r)

@@ -113,6 +113,19 @@ def setting_scatter(problem: Problem, fitted: Fit) -> dict[str, SettingScatter]:
     return found
 
 
+def correlation_chance(r: float, degrees_of_freedom: int) -> float:
+    """Chance of a correlation as close as r, either way: t = r sqrt((n - 1) / (1 - r²)) (Student).
+
+    Parameters
+    ----------
+    degrees_of_freedom : int
+        n of the values, their mean or means taken away.
+    """
+    r = min(abs(r), 1.0 - 1e-12)
+    t = r * math.sqrt((degrees_of_freedom - 1) / (1.0 - r * r))
+    return 2.0 * float(stats.t.sf(t, degrees_of_freedom - 1))
+
+
 def setting_notes(fitted: Fit, names: Sequence[str]) -> tuple[str, ...]:
     """Say of each of some settings by how much it is off."""
     return tuple(
@@ -174,7 +187,5 @@ def _chance(own: Samples, beside: Sequence[Samples], degrees_of_freedom: int) ->
         size = math.sqrt(float(row @ row) * float(own @ own))
         if degrees_of_freedom < 2 or not size > 0.0:
             continue
-        r = min(abs(float(row @ own)) / size, 1.0 - 1e-12)
-        t = r * math.sqrt((degrees_of_freedom - 1) / (1.0 - r * r))
-        chances.append(2.0 * float(stats.t.sf(t, degrees_of_freedom - 1)))
+        chances.append(correlation_chance(float(row @ own) / size, degrees_of_freedom))
     return min(1.0, len(chances) * min(chances)) if chances else 1.0
