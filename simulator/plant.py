@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from simulator.effects import Shot
 from simulator.plant_forces import Contact, Forces, Phase, Plant
 from simulator.plant_integrator import Event, NeverAtRestError, Path, Piece, integrate
+from simulator.position_lag import lag_behind
 
 __all__ = [
     "Event",
@@ -179,8 +180,12 @@ class Motion:
         return [(int(places[group[0]]), group) for group in np.split(order, cuts)]
 
     def position_m(self, time_s: Samples) -> Samples:
-        """Position of the part along +1 from where it lay, shape (n,)."""
-        return self._forces.sign * self._states(np.maximum(time_s, 0.0))[:, 0]
+        """Position of the part along +1 from where it lay, as its channel shows it, shape (n,)."""
+        advance = self._states(np.maximum(time_s, 0.0))[:, 0]
+        lag_s = sum(effect.position_time_constant() for effect in self._forces.effects)
+        if lag_s > 0.0:
+            advance -= lag_behind(self._path.pieces, lag_s, time_s)
+        return self._forces.sign * advance
 
     def velocity_m_s(self, time_s: Samples) -> Samples:
         """Velocity of the part along +1, shape (n,)."""

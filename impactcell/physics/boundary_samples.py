@@ -63,7 +63,7 @@ def resting_force(t: float, state: FloatPointer, phase: SmoothPhase) -> float:
 
 @compiled
 def fill_after_end(t: float, state: FloatPointer, phase: SmoothPhase, record: TapRecord) -> None:
-    """Fill the samples after the last phase: everything stays as it is, a lagging sensor settles."""
+    """Fill the samples after the last phase: everything stays as it is, lagging sensors settle."""
     index, times = record.sample_index, record.sample_times
     force = resting_force(t, state, phase)
     sign = phase.parameters[at.DIRECTION]
@@ -73,12 +73,16 @@ def fill_after_end(t: float, state: FloatPointer, phase: SmoothPhase, record: Ta
             since = times[i] - phase.cache[at.DELAY_S] - t
             shown += (phase.cache[at.LAGGED_FORCE] - force) * math.exp(-since / phase.cache[at.LAG_S])
         record.samples[i] = sensor_reading(shown, phase)
-    for channel in range(1, at.CHANNEL_COUNT):
-        value = sign * state[at.PART_SPEED]
-        if channel != at.PART_VELOCITY:
-            value = sign * state[at.ADVANCE if channel == at.POSITION else at.TRAVEL]
-        for i in range(index[channel], index[at.CHANNEL_COUNT + channel]):
-            record.samples[i] = value
+    for i in range(index[at.POSITION], index[at.CHANNEL_COUNT + at.POSITION]):
+        place = state[at.ADVANCE]
+        if phase.cache[at.POSITION_LAG_S] > 0.0:
+            behind = phase.cache[at.LAGGED_POSITION] - place
+            place += behind * math.exp((t - times[i]) / phase.cache[at.POSITION_LAG_S])
+        record.samples[i] = sign * place
+    for i in range(index[at.ACTUATOR], index[at.CHANNEL_COUNT + at.ACTUATOR]):
+        record.samples[i] = sign * state[at.TRAVEL]
+    for i in range(index[at.PART_VELOCITY], index[at.CHANNEL_COUNT + at.PART_VELOCITY]):
+        record.samples[i] = sign * state[at.PART_SPEED]
 
 
 @compiled

@@ -47,6 +47,8 @@ class LawKind(enum.IntEnum):
     """(): how late the force channel is recorded [s]."""
     STICK = at.STICK
     """(): stiffness of stick [N/m]."""
+    POSITION_LAG = at.POSITION_LAG
+    """(): time constant of the position sensor [s]."""
 
 
 class Kind(enum.Enum):

@@ -153,7 +153,7 @@ def _law_table(effects: tuple[Effect, ...], batches: int) -> LawTable:
         width += numbers + (len(effect.columns) if has_columns else 0)
         for place, law in effect.laws.items():
             lists[int(place)].append((effect.order, address(law), first))
-    for single in (LawKind.REACH, LawKind.LAG, LawKind.DELAY, LawKind.STICK):
+    for single in (LawKind.REACH, LawKind.LAG, LawKind.POSITION_LAG, LawKind.DELAY, LawKind.STICK):
         if len(lists[single]) > 1:
             raise PhysicsError(f"two effects both set the plant's {single.name.lower()}; use one of them")
     if len(lists[LawKind.LOSS]) > MAX_EFFECT_STATES:

@@ -39,7 +39,8 @@ READING: Final = 9  # of the force sensor
 LAG: Final = 10  # of the force sensor
 DELAY: Final = 11  # of the force channel
 STICK: Final = 12  # stiffness of stick
-LAW_KINDS: Final = 13  # how many kinds there are
+POSITION_LAG: Final = 13  # of the position sensor
+LAW_KINDS: Final = 14  # how many kinds there are
 
 # Contact mode: whole numbers that are constant within a smooth phase
 SLIP: Final = 0  # -1, +1: sense of slip along the tap; 0: rigid stick; 2: elastic stick
@@ -71,8 +72,11 @@ DRIVE_SLOPE: Final = 9  # of the driving force [N/s]
 DRIVE_TIME: Final = 10  # [s]
 RESTING_FROM_S: Final = 11  # when elastic stick began to ring, inf while it does not
 FORCE_POWERS: Final = 12  # coefficients of the contact force over a step, in powers of its fraction [N]
-LAG_MOMENTS: Final = 22  # room for the response of the sensor's lag to each of those powers [1]
-CACHE_COUNT: Final = 32  # length of the phase cache
+LAG_MOMENTS: Final = 22  # room for the response of a sensor's lag to each of those powers [1]
+POSITION_POWERS: Final = 32  # the same for how far the part goes over a step [m]
+POSITION_LAG_S: Final = 42  # of the position sensor
+LAGGED_POSITION: Final = 43  # the position sensor's state at the begin of the step, along the tap [m]
+CACHE_COUNT: Final = 44  # length of the phase cache
 
 # State
 ADVANCE: Final = 0  # of the part from its start, along the tap [m]
@@ -100,7 +104,7 @@ WAS_HALT: Final = 4  # `TapEventKind.HALT`
 
 # Sample index: index of the next sample of each channel, then where each channel ends, then room for events
 FORCE: Final = 0  # channel: contact force as the sensor shows it [N]
-POSITION: Final = 1  # channel: of the part along +1, from its start [m]
+POSITION: Final = 1  # channel: of the part along +1, from its start, as the sensor shows it [m]
 ACTUATOR: Final = 2  # channel: of the actuator along +1 [m]
 PART_VELOCITY: Final = 3  # channel: of the part along +1 [m/s]
 CHANNEL_COUNT: Final = 4  # how many channels there are

@@ -51,6 +51,7 @@ def cache_constants(t: float, phase: SmoothPhase) -> None:
     phase.cache[at.STICK_STIFFNESS] = stick if stick < RIGID_N_PER_M else 0.0
     phase.cache[at.ADHESION_REACH] = single_law_value(at.REACH, 0.0, phase)
     phase.cache[at.LAG_S] = single_law_value(at.LAG, 0.0, phase)
+    phase.cache[at.POSITION_LAG_S] = single_law_value(at.POSITION_LAG, 0.0, phase)
     phase.cache[at.DELAY_S] = single_law_value(at.DELAY, 0.0, phase)
     phase.cache[at.NEXT_KINK_S] = next_kink(t, phase)
     phase.cache[at.RESTING_FROM_S] = np.inf

@@ -2,7 +2,7 @@
 
 Forces that go with speed or indentation, of which nobody says where they come from: along the table whatever
 way the part goes, or in contact without vanishing where contact begins. As laws they would be strange; as
-what a model of a real machine leaves they are common. A filter of the force channel is the free form of what
+what a model of a real machine leaves they are common. A filter of either channel is the free form of what
 its amplifier and converter do; no spline is in it.
 """
 
@@ -77,3 +77,20 @@ FORCE_FILTER = Effect(
 """Filter of any delay and any lag: what a channel that comes late or rounded is held against. Ranges and
 sizes are those of the named delay and lag."""
 add_effect(FORCE_FILTER)
+
+POSITION_FILTER = Effect(
+    identifier="free_filter_of_position",
+    kind=Kind.SENSOR,
+    equation="tau x_m' + x_m = x(t + delay of the force)",
+    reference=FORCE_FILTER.reference,
+    phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE),
+    parameters=FORCE_FILTER.parameters,
+    laws={LawKind.DELAY: _delay, LawKind.POSITION_LAG: _lag},
+)
+"""The same of the position channel, whose delay is the force's early arrival."""
+add_effect(POSITION_FILTER)
+
+FILTERS: Mapping[str, Effect] = MappingProxyType(
+    {one.identifier: one for one in (FORCE_FILTER, POSITION_FILTER)}
+)
+"""Filters by the identifiers of their effects."""

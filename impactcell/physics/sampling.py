@@ -12,7 +12,7 @@ from impactcell.physics.memory_layout import SmoothPhase, StepBuffers, TapRecord
 from impactcell.physics.runge_kutta import STAGES, interpolate, interpolate_state
 
 POWERS: Final = at.LAG_MOMENTS - at.FORCE_POWERS
-"""Coefficients of the polynomial that stands for the contact force over a step."""
+"""Coefficients of the polynomial that stands for the contact force, or the position, over a step."""
 NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(POWERS) / (POWERS - 1))
 """Chebyshev-Lobatto points of the unit step, through which that polynomial goes."""
 MONOMIALS = np.linalg.inv(np.vander(NODES, increasing=True))
@@ -66,14 +66,27 @@ def exponential_moments(theta: float, ratio: float, out: FloatPointer) -> None:
 
 
 @compiled
+def lag_response(theta: float, ratio: float, before: float, powers: int, cache: FloatPointer) -> float:
+    """Show at the fraction `theta` of a step what a first-order lag that showed `before` makes of powers."""
+    exponential_moments(theta, ratio, advance(cache, at.LAG_MOMENTS))
+    value = before * math.exp(-theta / ratio)
+    for j in range(POWERS):
+        value += cache[powers + j] * cache[at.LAG_MOMENTS + j]
+    return value
+
+
+@compiled
 def lagged_force(theta: float, h: float, cache: FloatPointer) -> float:
     """Force after the lag of the sensor at the fraction `theta` of a step h that has been fitted [N]."""
-    ratio = cache[at.LAG_S] / h
-    exponential_moments(theta, ratio, advance(cache, at.LAG_MOMENTS))
-    value = cache[at.LAGGED_FORCE] * math.exp(-theta / ratio)
-    for j in range(POWERS):
-        value += cache[at.FORCE_POWERS + j] * cache[at.LAG_MOMENTS + j]
-    return value
+    return lag_response(theta, cache[at.LAG_S] / h, cache[at.LAGGED_FORCE], at.FORCE_POWERS, cache)
+
+
+@compiled
+def lagged_position(theta: float, h: float, cache: FloatPointer, step: StepBuffers) -> float:
+    """Position after the lag of its sensor at the fraction `theta` of a step h that has been fitted [m]."""
+    origin = step.state[at.ADVANCE]
+    before = cache[at.LAGGED_POSITION] - origin
+    return origin + lag_response(theta, cache[at.POSITION_LAG_S] / h, before, at.POSITION_POWERS, cache)
 
 
 @compiled
@@ -88,6 +101,18 @@ def fit_force(t: float, h: float, phase: SmoothPhase, step: StepBuffers) -> None
         force = force_at(NODES[i], t, h, phase, step)
         for j in range(POWERS):
             powers[j] += MONOMIALS[j, i] * force
+
+
+@compiled
+def fit_position(phase: SmoothPhase, step: StepBuffers) -> None:
+    """Fit the polynomial that is the way of the part over the step, in the fraction of the step."""
+    powers = advance(phase.cache, at.POSITION_POWERS)
+    for j in range(POWERS):
+        powers[j] = 0.0
+    for i in range(POWERS):
+        way = interpolate(NODES[i], step.interpolant, at.ADVANCE) - step.state[at.ADVANCE]
+        for j in range(POWERS):
+            powers[j] += MONOMIALS[j, i] * way
 
 
 @compiled
@@ -187,12 +212,27 @@ def fill_channel(
 
 
 @compiled
+def fill_lagged_position(
+    t: float, h: float, sign: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord
+) -> None:
+    """Fill the samples of the position channel that fall into [t, t + h) behind its lag, and carry it on."""
+    fit_position(phase, step)
+    index, times = record.sample_index, record.sample_times
+    first = index[at.POSITION]
+    end = samples_until(t + h, 0.0, first, index[at.CHANNEL_COUNT + at.POSITION], times)
+    for i in range(first, end):
+        record.samples[i] = sign * lagged_position((times[i] - t) / h, h, phase.cache, step)
+    index[at.POSITION] = end
+    phase.cache[at.LAGGED_POSITION] = lagged_position(1.0, h, phase.cache, step)
+
+
+@compiled
 def accept_step(
     t: float, h: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord, goal: int
 ) -> None:
     """Take samples of a step, and the peak force where outputs are wanted; go on from the step's end.
 
-    The sensor's lag is carried over it.
+    The sensors' lags are carried over it.
     """
     sign = phase.parameters[at.DIRECTION]
     if phase.cache[at.LAG_S] > 0.0:
@@ -200,7 +240,10 @@ def accept_step(
     if goal == at.TO_REST:
         update_peak_force(t, h, phase, step, record.outputs)
     fill_force(t, h, phase, step, record)
-    fill_channel(at.POSITION, at.ADVANCE, t, h, sign, step.interpolant, record)
+    if phase.cache[at.POSITION_LAG_S] > 0.0:
+        fill_lagged_position(t, h, sign, phase, step, record)
+    else:
+        fill_channel(at.POSITION, at.ADVANCE, t, h, sign, step.interpolant, record)
     fill_channel(at.ACTUATOR, at.TRAVEL, t, h, sign, step.interpolant, record)
     fill_channel(at.PART_VELOCITY, at.PART_SPEED, t, h, sign, step.interpolant, record)
     if phase.cache[at.LAG_S] > 0.0:

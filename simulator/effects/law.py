@@ -166,6 +166,10 @@ class Effect:
         """Return the sensor's first-order lag; where it is positive, the first own state is what it shows."""
         return 0.0
 
+    def position_time_constant(self) -> float:
+        """Return the first-order lag of the position sensor."""
+        return 0.0
+
     def delay(self) -> float:
         """Return by how much force is recorded late against position."""
         return 0.0

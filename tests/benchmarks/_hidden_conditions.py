@@ -24,8 +24,9 @@ COMPLIANT = {"presliding_compliance"}
 """Effects that are weaker where their parameter is larger."""
 SENSOR_ONLY = {
     "channel_skew", "force_saturation", "force_sensor_gain", "force_sensor_lag", "force_sensor_offset",
+    "position_sensor_lag",
 }  # fmt: skip
-"""Effects on what is measured of the force: no part moves differently."""
+"""Effects on what is measured: no part moves differently."""
 HOLDS = 0.8
 """Share of static friction that a restoring force may reach at the target, so that the part stays there."""
 
@@ -84,7 +85,7 @@ def scaled(effect: str, strength: float) -> dict[str, Parameter]:
 
 
 def hidden_effects() -> list[Condition]:
-    """Nothing hidden, then each of the 24 effects at its default strength and at 0.3 of it."""
+    """Nothing hidden, then each effect at its default strength and at 0.3 of it."""
     conditions = [Condition("none")]
     for effect in LIBRARY:
         conditions += [Condition(effect, s, {effect: scaled(effect, s)}) for s in STRENGTHS]

@@ -1,4 +1,4 @@
-"""Positioning with something hidden: the simulator's own plant, each of the 24 effects in turn, and none.
+"""Positioning with something hidden: the simulator's own plant, each effect in turn, and none.
 
 Reads what `python -m tests.benchmarks._hidden_tasks --seeds reporting` has gathered, and says how much that
 is; runs a little of it where there is nothing yet. `python -m tests.benchmarks.positioning_hidden` stores

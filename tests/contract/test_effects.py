@@ -42,6 +42,7 @@ VOCABULARY = {
     "restoring_force": ("stiffness_n_per_m",),
     "mass_error": ("relative_error",),
     "force_sensor_lag": ("time_constant_s",),
+    "position_sensor_lag": ("time_constant_s",),
     "force_sensor_gain": ("relative_error",),
     "force_sensor_offset": ("offset_n",),
     "force_saturation": ("limit_n",),

@@ -5,7 +5,7 @@ hidden are drawn from its seed; how strong it is, is given, or calibrated to a g
 """
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,8 @@ SIGNED = frozenset(
     }
 )  # fmt: skip
 """Effects whose strength may have either sign."""
+JOINED = ("position_sensor_lag",)
+"""Effects that joined when studies had been run: campaigns of the others stay what they were."""
 
 
 @dataclass(frozen=True)
@@ -72,11 +74,17 @@ class Job:
         return json.dumps(asdict(self), sort_keys=True)
 
 
+def numbered(effects: Iterable[str]) -> list[str]:
+    """Effects as seeds count them: by name, and behind them those that joined later."""
+    names = sorted(effects)
+    return [*(one for one in names if one not in JOINED), *(one for one in JOINED if one in names)]
+
+
 def strengths(effect: str, strength: float, seed: int | None = None) -> dict[str, float | list[float]]:
     """Parameters of an effect at a multiple of its default strength; with a seed its shapes are drawn."""
     defaults: dict[str, Value] = dict({**LAWS, **UNLISTED}[effect].defaults)
     if seed is not None:
-        rng = np.random.default_rng([seed, 7, sorted({**LAWS, **UNLISTED}).index(effect)])
+        rng = np.random.default_rng([seed, 7, numbered({**LAWS, **UNLISTED}).index(effect)])
         defaults = _drawn(effect, defaults, rng)
     (name, value), *rest = defaults.items()
     if isinstance(value, Sequence):

@@ -26,7 +26,7 @@ from impactcell.discrepancy.search import Outdone
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.physics.effects import LIBRARY as EFFECTS
 from impactcell.physics.free_forms import FINER
-from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
+from impactcell.physics.remainder_forms import FILTERS, FORCE_FILTER, POSITION_FILTER, REMAINDER_FORMS
 from tests.discrepancy.study import Job, campaign, strengths
 
 SHOTS = 16
@@ -246,6 +246,8 @@ def test_a_name_between_shots_falls_to_a_form_that_narrows_the_factors_as_much_f
     [
         ("channel_skew", FORCE_FILTER.identifier),
         ("force_sensor_lag", FORCE_FILTER.identifier),
+        ("channel_skew", POSITION_FILTER.identifier),
+        ("position_sensor_lag", POSITION_FILTER.identifier),
         ("friction_patch", "free_friction_over_position"),
         ("viscous_friction", "free_drag_over_speed"),
         ("hertz_contact", "free_stiffness_over_indentation"),
@@ -256,7 +258,7 @@ def test_a_name_between_shots_falls_to_a_form_that_narrows_the_factors_as_much_f
     ],
 )
 def test_an_effect_has_its_place_among_the_free_forms(effect: str, place: str) -> None:
-    assert place in {*REMAINDER_FORMS, FORCE_FILTER.identifier}
+    assert place in {*REMAINDER_FORMS, *FILTERS}
     assert effect in EFFECTS
     assert is_in_its_place(effect, place)
     assert not is_in_its_place(effect, "free_speed_over_time")

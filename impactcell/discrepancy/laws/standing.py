@@ -2,7 +2,7 @@
 
 An effect that stands out takes most of a gap, but so may another law's best likeness in the library: a patch
 of friction is drawn to a pull that ends somewhere. So each place at which the equations of motion allow a
-force, a friction, a motion or a reading of no form gets a free form, fitted alone, and the force channel a
+force, a friction, a motion or a reading of no form gets a free form, fitted alone, and either channel a
 filter. A name falls to a form elsewhere that explains as much. In its own place a form that explains more is
 to be expected beside other errors, as it takes a part of them; where it leaves nothing the place is right,
 and the law is not. So it is where the form keeps ahead when name and form each have a second form beside them
@@ -37,7 +37,7 @@ from impactcell.physics import Kind
 from impactcell.physics.effect import Effect, LawKind
 from impactcell.physics.effects import find_effect
 from impactcell.physics.free_form import FreeForm
-from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
+from impactcell.physics.remainder_forms import FILTERS, REMAINDER_FORMS
 
 MIN_SHARE_OF_FREE = 0.9
 """Share of the squared gap that a term alone closes which a name has to close [1]: one wave or patch has been
@@ -53,7 +53,7 @@ STATES = tuple(10.0**power for power in range(-6, 3))
 """Values of what a law reads, from micrometres to hundreds of newtons, over which it is asked whether
 it does [SI]."""
 FILTER_STARTS = ((0.0, 1.0), (1.0, 0.0), (-1.0, 0.0))
-"""Delay and time constant at which fits of the filter start, in units of their typical sizes [1]."""
+"""Delay and time constant at which fits of a filter start, in units of their typical sizes [1]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,9 +80,10 @@ def fit_free_forms(context: SearchContext, rough: Fit) -> FreeForms:
     fitted = [fit_term(context, rough, form) for form in REMAINDER_FORMS.values()]
     terms = {term.form.place: term for term in fitted if term is not None}
     alone = [score_term(term, "", 1.0) for term in terms.values()]
-    filtered = _fit_filter(context, rough)
-    if filtered is not None:
-        alone.append(score_fit(context.coarse, filtered, "", FORCE_FILTER.identifier))
+    for identifier in FILTERS:
+        filtered = _fit_filter(context, rough, identifier)
+        if filtered is not None:
+            alone.append(score_fit(context.coarse, filtered, "", identifier))
     return FreeForms(rough, tuple(sorted(alone, key=lambda model: -model.score)), terms)
 
 
@@ -98,11 +99,11 @@ def fit_term(context: SearchContext, base: Fit, form: FreeForm) -> FreeTerm | No
     return FreeTerm(form, span, problem, fitted, FIRST_TRY, np.empty(0))
 
 
-def _fit_filter(context: SearchContext, rough: Fit) -> Fit | None:
-    """Fit the filter of the force channel from several starts, and keep the likeliest; None without one."""
+def _fit_filter(context: SearchContext, rough: Fit, identifier: str) -> Fit | None:
+    """Fit a filter of a channel from several starts, and keep the likeliest; None without a force channel."""
     if not (context.coarse.shots.channel == FORCE).any():
         return None
-    problem = context.coarse.with_effects((*rough.effects, FORCE_FILTER.identifier))
+    problem = context.coarse.with_effects((*rough.effects, identifier))
     fits = []
     for start in FILTER_STARTS:
         theta = np.concatenate([rough.theta, start])
@@ -247,8 +248,8 @@ def closes_enough(form: ScoredModel, named: ScoredModel, rough: Fit) -> bool:
 def is_in_its_place(effect: str, place: str) -> bool:
     """Whether a free form may be the law of an effect: it enters where that does, and reads all it reads."""
     named = find_effect(effect)
-    if place == FORCE_FILTER.identifier:
-        return bool(set(named.laws) & set(FORCE_FILTER.laws))
+    if place in FILTERS:
+        return bool(set(named.laws) & set(FILTERS[place].laws))
     form = REMAINDER_FORMS[place]
     shared = set(named.laws) & set(form.effect.laws)
     return any(state_read(named, kind) <= form.state for kind in shared)

@@ -11,9 +11,10 @@ from scipy.interpolate import BSpline
 from impactcell.errors import PhysicsError
 from impactcell.physics import Ensemble, Plant, TapInput, simulate_tap
 from impactcell.physics.bspline import spline, spline_basis
+from impactcell.physics.effect import Effect
 from impactcell.physics.effects import LIBRARY, add_effect, find_effect
 from impactcell.physics.free_forms import FREE_FORMS, SPANS, SPANS_OF_TABLE
-from impactcell.physics.remainder_forms import FORCE_FILTER, REMAINDER_FORMS
+from impactcell.physics.remainder_forms import FILTERS, FORCE_FILTER, POSITION_FILTER, REMAINDER_FORMS
 
 TIMES = np.linspace(1e-4, 0.02, 100)
 TAP = TapInput(velocity_m_s=0.075, mass_kg=12.0, stroke_m=0.004, start_m=0.01)
@@ -133,16 +134,23 @@ def test_pull_of_a_straight_line_is_adhesion() -> None:
     )
 
 
-@pytest.mark.parametrize("named", [("channel_skew", "delay_s"), ("force_sensor_lag", "time_constant_s")])
-def test_filter_of_force_is_a_delay_and_a_lag(named: tuple[str, str]) -> None:
-    effect, parameter = named
+@pytest.mark.parametrize(
+    ("filtered", "effect", "parameter"),
+    [
+        (FORCE_FILTER, "channel_skew", "delay_s"),
+        (FORCE_FILTER, "force_sensor_lag", "time_constant_s"),
+        (POSITION_FILTER, "channel_skew", "delay_s"),
+        (POSITION_FILTER, "position_sensor_lag", "time_constant_s"),
+    ],
+)
+def test_filter_of_a_channel_is_a_delay_and_a_lag(filtered: Effect, effect: str, parameter: str) -> None:
     values = {"delay_s": 0.0, "time_constant_s": 0.0, parameter: 4e-4}
     reading, expected = (
-        Ensemble([TAP], (identifier,), force_time_s=[TIMES]).samples(
+        Ensemble([TAP], (identifier,), force_time_s=[TIMES], position_time_s=[TIMES]).samples(
             np.array([6e5, 465.0, 0.2, 0.15, *numbers]), np.ones(1)
         )
         for identifier, numbers in (
-            (FORCE_FILTER.identifier, values.values()),
+            (filtered.identifier, values.values()),
             (effect, (values[parameter],)),
         )
     )
@@ -150,7 +158,7 @@ def test_filter_of_force_is_a_delay_and_a_lag(named: tuple[str, str]) -> None:
 
 
 def test_no_free_form_is_offered_as_an_effect() -> None:
-    assert FORCE_FILTER.identifier not in LIBRARY
+    assert not set(FILTERS) & set(LIBRARY)
     assert set(FREE_FORMS) < set(REMAINDER_FORMS)
     assert not set(REMAINDER_FORMS) & set(LIBRARY)
     for identifier, form in REMAINDER_FORMS.items():

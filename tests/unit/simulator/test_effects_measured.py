@@ -52,6 +52,26 @@ def test_lag_against_convolution() -> None:
         assert lagged.force_n(np.array([t]))[0] == pytest.approx(expected, rel=1e-6, abs=1e-6)
 
 
+@pytest.mark.parametrize("direction", [1, -1])
+def test_lag_of_the_position_against_convolution(direction: int) -> None:
+    tau = 8e-4
+    effects = {"position_sensor_lag": {"time_constant_s": tau}}
+    strike = replace(STRIKE, direction=direction)
+    lagged, motion = struck(effects, strike), struck({}, strike)
+    breaks = [event.time_s for event in motion.events]
+    for t in (0.002, 0.012, 0.03, motion.end_s + 0.5 * tau):
+        expected = quad(
+            lambda s, t=t: math.exp(-(t - s) / tau) / tau * motion.position_m(np.array([s]))[0],
+            0.0,
+            t,
+            points=[p for p in breaks if 0.0 < p < t],
+            limit=200,
+            epsabs=1e-13,
+        )[0]
+        assert lagged.position_m(np.array([t]))[0] == pytest.approx(expected, rel=1e-6, abs=1e-11)
+    np.testing.assert_allclose(lagged.force_n(TIME), motion.force_n(TIME), atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("name", "parameters", "static", "kinetic"),
     [
