@@ -66,7 +66,9 @@ def test_a_library_of_which_no_shot_can_test_anything_names_nothing(library: tup
     assert (found.verdict, found.added) == ("no_gap", ())
 
 
-@pytest.mark.parametrize("effect", ["viscous_friction", "channel_skew", "friction_drift"])
+@pytest.mark.parametrize(
+    "effect", ["viscous_friction", "channel_skew", "position_sensor_lag", "friction_drift"]
+)
 def test_a_hidden_effect_is_named_with_its_parameters(effect: str) -> None:
     found = investigate(make(effect))
     assert effect in answer(found)[1]
