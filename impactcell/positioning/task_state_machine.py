@@ -19,7 +19,7 @@ from impactcell.errors import PositioningError
 from impactcell.positioning.planner import TapPlanner
 from impactcell.positioning.safety_limits import SafetyLimits, check_tap
 from impactcell.positioning.tap import Tap, Unreachable
-from impactcell.records import Evidence, PositioningState
+from impactcell.records import LARGEST_STATISTIC, Evidence, PositioningState
 
 BAND_SIGMAS = 3.29  # the band of a displacement holds 99.9 %
 MOST_TAPS = 200  # of one task; a task that needs more is not converging
@@ -212,8 +212,9 @@ def observed(sequence: TaskState, cell: PositioningCell, planner: TapPlanner, po
     planner.observe(tap, moved, sequence.mass_kg)
     lies = replace(sequence, position_m=position_m, tap=None)
     half = 0.5 * (tap.highest_m - tap.lowest_m)
+    missed = abs(moved - tap.expected_m) / half * BAND_SIGMAS if half > 0.0 else math.inf
     evidence = Evidence(
-        statistic=abs(moved - tap.expected_m) / half * BAND_SIGMAS if half > 0.0 else math.inf,
+        statistic=min(missed, LARGEST_STATISTIC),
         threshold=BAND_SIGMAS,
         size=moved - tap.expected_m,
         size_std=half / BAND_SIGMAS,

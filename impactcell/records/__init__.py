@@ -4,7 +4,7 @@ A `Capture` comes in; `FrictionEstimate`, `WearState`, `BatchState`, `Signature`
 from it; a `Snapshot` holds them together for one cycle and is what is published and journalled.
 """
 
-from impactcell.records.alarm import Alarm, Evidence, Shelving
+from impactcell.records.alarm import LARGEST_STATISTIC, Alarm, Evidence, Shelving
 from impactcell.records.capture import (
     AT_THE_HALT_S,
     FORCE_SCALE_STD,
@@ -37,6 +37,7 @@ from impactcell.records.units import MM_PER_MIN
 __all__ = [
     "AT_THE_HALT_S",
     "FORCE_SCALE_STD",
+    "LARGEST_STATISTIC",
     "MASS_STD",
     "MM_PER_MIN",
     "POSITION_SCALE_STD",

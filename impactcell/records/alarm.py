@@ -3,6 +3,10 @@
 import enum
 from dataclasses import dataclass, field
 
+LARGEST_STATISTIC = 1000.0
+"""Of a change, in nats, or of a miss, in standard deviations; more is told as this, infinity too: how certain
+it is beyond cannot be told, and what is told has to be a number for JSON and those who draw it."""
+
 
 class Shelving(enum.Enum):
     """Shelved states of OPC UA Part 9, ShelvedStateMachineType."""

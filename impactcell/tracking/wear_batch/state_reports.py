@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from impactcell.records import BatchState, Evidence, Quality, Samples, WearState
+from impactcell.records import LARGEST_STATISTIC, BatchState, Evidence, Quality, Samples, WearState
 from impactcell.tracking.wear_batch import (
     batch_change_detection,
     noise_scale,
@@ -24,9 +24,6 @@ from impactcell.tracking.wear_batch.wear_report import WearMoments
 
 SECONDS_A_DAY = 86_400.0
 """Seconds."""
-LARGEST_STATISTIC = 1000.0
-"""Nats; more is told as this, the infinity of a change beside which that there was none is given up too: how
-certain it is beyond cannot be told, and what is told has to be a number for JSON and those who draw it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import impactcell
 from impactcell.cli.app import app
 from impactcell.cli.track import track
 from impactcell.errors import SeriesError
-from impactcell.tracking.wear_batch.state_reports import LARGEST_STATISTIC
+from impactcell.records import LARGEST_STATISTIC
 
 STD = 0.002
 

@@ -20,6 +20,7 @@ from impactcell.positioning.task_state_machine import (
     failed,
     observed,
 )
+from impactcell.records import LARGEST_STATISTIC
 
 LIMITS = SafetyLimits(velocity_m_s=0.1, stroke_m=1.5e-3, travel_m=(0.0, 60e-3))
 CELL = PositioningCell("press 3", LIMITS, resolution_m=1e-6)
@@ -122,6 +123,18 @@ def test_a_displacement_outside_its_band_stops_with_evidence(side: float) -> Non
     assert stopped.evidence.size == pytest.approx(moved - tap.expected_m)
     inside = observed(sequence, CELL, made, sequence.position_m + 0.999 * tap.expected_m)
     assert inside.phase in {TaskPhase.COMMANDING, TaskPhase.SETTLED}
+
+
+@pytest.mark.parametrize("half_m", [0.0, 1e-12])
+def test_a_miss_beyond_all_measure_has_a_statistic_that_json_can_write(half_m: float) -> None:
+    sequence, made = waiting()
+    tap = sequence.tap
+    assert tap is not None
+    sure = replace(tap, lowest_m=tap.expected_m - half_m, highest_m=tap.expected_m + half_m)
+    far = sequence.position_m + tap.expected_m + 1e-3
+    stopped = observed(replace(sequence, tap=sure), CELL, made, far)
+    assert stopped.evidence is not None
+    assert stopped.evidence.statistic == LARGEST_STATISTIC > stopped.evidence.threshold
 
 
 def test_a_lost_link_and_an_abort_at_any_moment() -> None:
