@@ -285,4 +285,5 @@ class ModuleAcquisition:
                 "%d before it %s lost: the module %s %s", received.missed, are, why, them, cycle=cycle
             )
         for fault in received.faults:
-            self._log.warning("%s", fault.removeprefix(f"{self.cell}: cycle {cycle}: "), cycle=cycle)
+            said = fault.removeprefix(f"{self.cell}: cycle {cycle}").lstrip(": ")
+            self._log.warning("%s", said, cycle=cycle)

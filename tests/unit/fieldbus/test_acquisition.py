@@ -351,7 +351,7 @@ async def test_a_window_that_is_being_changed_is_not_read(fpga: RegisterMap) -> 
 
 
 async def test_a_capture_that_never_fits_its_crc_is_passed_on_empty_and_the_next_is_good(
-    fpga: RegisterMap,
+    fpga: RegisterMap, caplog: pytest.LogCaptureFixture
 ) -> None:
     device = ScriptedDevice(fpga)
     make(device, capture_crc32=12345)
@@ -363,6 +363,8 @@ async def test_a_capture_that_never_fits_its_crc_is_passed_on_empty_and_the_next
         assert "cell-1: cycle 1 could not be read: register capture_crc32 (314) does not fit" in bad.faults[0]
         assert_whole(good)
         assert (module.status.unreadable, module.status.received) == (1, 2)
+        (told,) = [line for line in caplog.messages if "capture_crc32" in line]
+        assert told.startswith("cell=cell-1 cycle=1 could not be read: register")
 
 
 @pytest.mark.parametrize(
