@@ -15,11 +15,13 @@ EFFECT = Effect(
     equation="tau x_m' + x_m = x",
     reference="First-order instrument: Doebelin, Measurement Systems, McGraw-Hill (2003), chapter 3",
     meaning="The position signal follows the part late and rounded, as through a filter.",
-    look_at="the low-pass or averaging filter of the position sensor: many have one that can be set",
+    look_at="the low-pass or averaging filter of the position sensor, which many have, and whether the "
+    "position is recorded late",
     german=German(
         "Trägheit des Positionssensors",
         "Das Positionssignal folgt dem Teil verspätet und verrundet, wie durch ein Filter.",
-        "das Tiefpass- oder Mittelungsfilter des Positionssensors: bei vielen ist es einstellbar",
+        "das Tiefpass- oder Mittelungsfilter des Positionssensors, das viele haben, und ob die Position "
+        "verspätet aufgezeichnet wird",
     ),
     phases=(Phase.LOADING, Phase.UNLOADING, Phase.FREE_SLIDE, Phase.STOP),
     parameters=(Parameter("time_constant_s", "s", null=0.0, lower=0.0, upper=0.02, typical=0.0003),),
