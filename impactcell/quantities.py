@@ -231,6 +231,8 @@ MODULE: Final[tuple[Quantity[ModuleStatus], ...]] = (
 """Quantities of the link, which change without a cycle too."""
 # fmt: on
 
+POSITIONING: Final = tuple(quantity for quantity in CYCLE if quantity.path.startswith("Positioning/"))
+"""Those that change between cycles, too."""
 BY_PATH: Final[Mapping[str, Quantity[Snapshot]]] = {quantity.path: quantity for quantity in CYCLE}
 """Quantities that each cycle writes, by path."""
 HISTORY: Final = tuple(quantity.path for quantity in CYCLE if quantity.has_history)

@@ -7,6 +7,7 @@ lost with the link is repeated safely.
 
 import asyncio
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -51,8 +52,14 @@ class TapCommander:
             name in self._module.registers for name in (*_PARAMETERS, "command_sequence", "command_result")
         )
 
-    async def tap(self, command: TapCommand) -> int:
+    async def tap(self, command: TapCommand, is_wanted: Callable[[], bool] = lambda: True) -> int:
         """Execute one tap; return the number of the cycle that it made.
+
+        Parameters
+        ----------
+        is_wanted : callable
+            Asked at the last moment before the module is told to strike: where it says no, nothing is
+            commanded any more, however long the link was down.
 
         Raises
         ------
@@ -72,7 +79,8 @@ class TapCommander:
                         )
                     await self._write_parameters(command)
                     commanded = True
-                    return await self._execute(session, before.accepted_command % (2**32 - 1) + 1)
+                    sequence = before.accepted_command % (2**32 - 1) + 1
+                    return await self._execute(session, sequence, is_wanted)
             except TimeoutError:
                 struck = "the part may have been struck" if commanded else "nothing has been commanded"
                 raise PositioningError(
@@ -95,8 +103,34 @@ class TapCommander:
                 f"{self._module.cell}: the module has not been read for {self._patience_s:g} s"
             ) from None
 
+    async def read_report_at_rest(self) -> PositioningStatus:
+        """Return what the module says once it is ready for a tap, the part at rest.
+
+        Raises
+        ------
+        PositioningError
+            It was not in time.
+        """
+        try:
+            async with asyncio.timeout(self._patience_s):
+                while True:
+                    report = await self.read_report()
+                    if report.state == "ready":
+                        return report
+                    await asyncio.sleep(_POLL_S)
+        except TimeoutError:
+            raise PositioningError(
+                f"{self._module.cell}: the module has not been ready for {self._patience_s:g} s"
+            ) from None
+
     async def abort(self) -> None:
-        """Abort what is being executed; raises LinkError without a connection."""
+        """Abort what is being executed.
+
+        Raises
+        ------
+        FieldbusError
+            There is no connection, the module refuses, or the map has no `command_abort`.
+        """
         await self._module.register_client.write_values({"command_abort": 1})
 
     def _check(self, command: TapCommand) -> None:
@@ -153,7 +187,7 @@ class TapCommander:
             else:
                 return
 
-    async def _execute(self, session: int, sequence: int) -> int:
+    async def _execute(self, session: int, sequence: int, is_wanted: Callable[[], bool]) -> int:
         """Write the sequence number until the module has it, and wait for the outcome."""
         cell = self._module.cell
         written = False
@@ -167,6 +201,8 @@ class TapCommander:
                 if positioning.result != "executing":
                     raise PositioningError(f"{cell}: tap {sequence}: {positioning.result}")
             elif not written:
+                if not is_wanted():
+                    raise PositioningError(f"{cell}: aborted; nothing has been commanded")
                 try:
                     await self._module.register_client.write_values({"command_sequence": sequence})
                     written = True

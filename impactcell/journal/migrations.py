@@ -274,7 +274,8 @@ STATE_MIGRATIONS: Final = (
         }
     ),
     Migration(added=_under("snapshot.signature", {"t_squared_limit": math.nan, "spe_limit": math.nan})),
+    Migration(added={"handled_target": None}),
 )
-"""Of a cell's state: to formats 2 to 10. What earlier planners had not counted is nothing."""
+"""Of a cell's state: to formats 2 to 11. What earlier planners had not counted is nothing."""
 ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)
 MODEL_MIGRATIONS: Final = (Migration(_model_2, renamed=_MODEL_2_RENAMED),)

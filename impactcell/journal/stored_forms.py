@@ -25,17 +25,19 @@ from impactcell.tracking.wear_batch import TrackerState
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredState:
-    """What a restart goes on from: the state, the last snapshot, what the planner has learned.
+    """What a restart goes on from: the state, the last snapshot, what the planner has learned, what is done.
 
     The alarms of the snapshot are not stored: they are those of the state. `last` is the last cycle that the
     state has taken in, None where a version before format 4 wrote it: the module may still show that cycle,
-    and a journal begun anew has no row of it.
+    and a journal begun anew has no row of it. `handled_target` is the module's session and the sequence of
+    the PLC's target whose task has ended, however it did: the module shows it, and nobody wants it again.
     """
 
     cell: CellState
     snapshot: Snapshot | None = None
     planner: PlannerPosterior | None = None
     last: CycleId | None = None
+    handled_target: tuple[int, int] | None = None
 
 
 STATE: Final = Versioned("the state", StoredState, STATE_MIGRATIONS)
@@ -79,7 +81,7 @@ def pack_state(stored: StoredState, unknown: Unknown | None = None) -> bytes:
     """Write a state, with what an earlier `unpack_state` had to set aside."""
     snapshot = stored.snapshot
     if snapshot is not None:
-        stored = StoredState(stored.cell, replace(snapshot, alarms=()), stored.planner, stored.last)
+        stored = replace(stored, snapshot=replace(snapshot, alarms=()))
     return STATE.pack(stored, unknown)
 
 

@@ -8,9 +8,9 @@ from asyncua import ua
 
 from impactcell.opcua.node_references import read_attribute
 from impactcell.opcua.variable_store import GOOD, StoredVariable, VariableStore, moment
-from impactcell.quantities import CYCLE, MODULE
+from impactcell.quantities import CYCLE, MODULE, POSITIONING
 from impactcell.records import ModuleStatus, Quality, Snapshot
-from impactcell.records.quantity import Value
+from impactcell.records.quantity import Quantity, Value
 from impactcell.scada.cell_nodes import CellSpace
 
 BAD: Final = ua.StatusCode(ua.StatusCodes.Bad)
@@ -54,8 +54,15 @@ class CellValues:
 
     def publish(self, snapshot: Snapshot) -> None:
         """Write all that one cycle has to say."""
-        time, now = moment(snapshot.time_ns), datetime.now(UTC)
-        for quantity in CYCLE:
+        self._publish(CYCLE, snapshot, snapshot.time_ns)
+
+    def positioning(self, snapshot: Snapshot, time_ns: int) -> None:
+        """Write the positioning task as it is between cycles; all else stays as it is, bad and stale too."""
+        self._publish(POSITIONING, snapshot, time_ns)
+
+    def _publish(self, quantities: tuple[Quantity[Snapshot], ...], snapshot: Snapshot, time_ns: int) -> None:
+        time, now = moment(time_ns), datetime.now(UTC)
+        for quantity in quantities:
             value, quality = quantity.read(snapshot)
             self._write(quantity.path, value, quality, time, now)
 

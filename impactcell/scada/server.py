@@ -163,6 +163,10 @@ class Server:
         """Show the values of one cycle; its alarms are shown by `alarm` alone."""
         self._cells[cell].publish(snapshot)
 
+    def positioning(self, cell: str, snapshot: Snapshot, time_ns: int) -> None:
+        """Show the positioning task of a snapshot, and nothing else of it."""
+        self._cells[cell].positioning(snapshot, time_ns)
+
     def alarm(self, cell: str, alarm: Alarm) -> None:
         """Show the state of a condition; an event goes out where it has changed.
 

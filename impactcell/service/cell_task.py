@@ -151,7 +151,7 @@ class CellTask:
         design = cell_design(self.cell)
         await self.worker.redesign(design)
         if self._positioning is not None:
-            await self._positioning.redesign(design)
+            await self._positioning.redesign(self.cell, design)
         self.log.info("reloaded; model %s", self.cell.model.name)
 
     async def set_target(self, target_m: float, audit: AuditEntry) -> None:
@@ -181,7 +181,7 @@ class CellTask:
             audit = replace(audit, result=str(error))
             raise
         finally:
-            await self.worker.record_audit(audit)
+            await self.worker.record(audit)
 
     def _positioning_task(self) -> PositioningTask:
         if self._positioning is None:
@@ -236,7 +236,7 @@ class CellTask:
             self._positioning_change.clear()
             task = self._positioning_task()
             if self.worker.snapshot is not None:
-                self._publisher.publish(self.worker.snapshot)
+                self._publisher.publish_positioning(self.worker.snapshot)
             fault = task.fault
             reason, evidence = fault or ("", Evidence())
             await self._apply_rule_result(positioning_fault.result(reason, evidence))

@@ -9,8 +9,10 @@ from impactcell.alarms import RULES, AlarmSettings
 from impactcell.alarms.rules import wear_limit, wear_warning
 from impactcell.cell import CellDesign
 from impactcell.cell.preprocessing import CaptureDefaults
+from impactcell.errors import PositioningError
 from impactcell.fieldbus.link import ModuleLink, SerialLine, TlsFiles
 from impactcell.journal.retention import Retention
+from impactcell.positioning import SafetyLimits, TapPlanner, task_state_machine
 from impactcell.records import MM_PER_MIN
 from impactcell.scada import (
     CellDescription,
@@ -177,4 +179,43 @@ def cell_description(cell: CellConfig) -> CellDescription:
             software_revision=__version__,
         ),
         ranges if travel_m is None else replace(ranges, target_m=(0.0, travel_m)),
+    )
+
+
+def positioning_cell(cell: CellConfig) -> task_state_machine.PositioningCell:
+    """Make what a positioning task has to know of a cell.
+
+    Raises
+    ------
+    PositioningError
+        The cell has no positioning.
+    """
+    settings, actuator = cell.settings.positioning, cell.settings.actuator
+    if settings is None:
+        raise PositioningError(f"{cell.name}: this cell has no positioning; add it to {cell.path}")
+    limits = SafetyLimits(
+        velocity_m_s=actuator.max_velocity_mm_per_min / 60e3,
+        stroke_m=actuator.max_stroke_mm * 1e-3,
+        force_n=math.inf if actuator.max_force_n is None else actuator.max_force_n,
+        travel_m=(0.0, settings.travel_mm * 1e-3),
+    )
+    return task_state_machine.PositioningCell(
+        cell.name, limits, settings.encoder_resolution_um * 1e-6, two_sided=actuator.both_ends
+    )
+
+
+def tap_planner(
+    cell: CellConfig, limited: task_state_machine.PositioningCell, design: CellDesign
+) -> TapPlanner:
+    """Make the planner of a cell, which has learned nothing yet."""
+    settings, limits = cell.settings.positioning, limited.limits
+    assert settings is not None  # noqa: S101 - `_positioning_cell` has looked
+    return TapPlanner(
+        tolerance_m=settings.tolerance_um * 1e-6,
+        max_velocity_m_s=limits.velocity_m_s,
+        max_stroke_m=limits.stroke_m,
+        overshoot_probability=settings.overshoot_probability,
+        plant=design.model.plant,
+        max_force_n=limits.force_n,
+        two_sided=limited.two_sided,
     )

@@ -52,7 +52,7 @@ class OperatorCommands:
 
     async def record_model(self, cell: str, action: str, model: str, actor: Actor) -> None:
         """Write down that somebody has put another model into service."""
-        await self._cell(cell).worker.record_audit(_audit(actor, f"model {action}", Model=model))
+        await self._cell(cell).worker.record(_audit(actor, f"model {action}", Model=model))
 
     async def act_on_condition(
         self,

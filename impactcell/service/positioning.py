@@ -12,10 +12,11 @@ from impactcell.errors import FieldbusError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.status_block import PositioningStatus
 from impactcell.fieldbus.tap_commands import TapCommand, TapCommander
-from impactcell.positioning import PlannerPosterior, SafetyLimits, TapPlanner, task_state_machine
+from impactcell.positioning import PlannerPosterior, task_state_machine
 from impactcell.positioning.task_state_machine import TaskOutcome, TaskPhase, TaskState
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import Evidence, PositioningState, Quality, Snapshot
+from impactcell.service.factory import positioning_cell, tap_planner
 from impactcell.service.worker import CellWorker
 from impactcell.settings import CellConfig
 
@@ -50,32 +51,12 @@ class PositioningTask:
         worker: CellWorker,
         changed: Callable[[], None],
     ) -> None:
-        settings, actuator = cell.settings.positioning, cell.settings.actuator
-        if settings is None:
-            raise PositioningError(f"{cell.name}: this cell has no positioning; add it to {cell.path}")
-        limits = SafetyLimits(
-            velocity_m_s=actuator.max_velocity_mm_per_min / 60e3,
-            stroke_m=actuator.max_stroke_mm * 1e-3,
-            force_n=math.inf if actuator.max_force_n is None else actuator.max_force_n,
-            travel_m=(0.0, settings.travel_mm * 1e-3),
-        )
         self._log = CellLogger(logging.getLogger(__name__), cell.name)
-        self._cell = task_state_machine.PositioningCell(
-            cell.name, limits, settings.encoder_resolution_um * 1e-6, two_sided=actuator.both_ends
-        )
-        self._planner = TapPlanner(
-            tolerance_m=settings.tolerance_um * 1e-6,
-            max_velocity_m_s=limits.velocity_m_s,
-            max_stroke_m=limits.stroke_m,
-            overshoot_probability=settings.overshoot_probability,
-            plant=design.model.plant,
-            max_force_n=limits.force_n,
-            two_sided=actuator.both_ends,
-        )
+        self._cell = positioning_cell(cell)
+        self._planner = tap_planner(cell, self._cell, design)
         if worker.belief is not None:
             self._planner.resume(worker.belief)
         self._design = design
-        self._mass_kg = design.defaults.mass_kg
         self._module = module
         self._positioner = TapCommander(module)
         self._worker = worker
@@ -85,7 +66,10 @@ class PositioningTask:
         """Of the last tasks, in their order."""
         self._wake = asyncio.Event()
         self._predictions = self._planner.predictions
-        self._plc_target: int | None = None
+        self._plc_target: int | None = None  # sequence of the one that was looked at last
+        self._begun_target: tuple[int, int] | None = None  # session and sequence of the one whose task runs
+        self._at_rest = asyncio.Event()  # no tap is under way, also none that was aborted
+        self._at_rest.set()
         self._batch_shift_cycle = 0
 
     @property
@@ -113,29 +97,32 @@ class PositioningTask:
         PositioningError
             The target is refused; nothing has been commanded.
         """
-        status_block = self._report()
-        mass_kg = status_block.mass_kg
-        if math.isnan(mass_kg) and self._mass_kg is not None:
-            mass_kg = self._mass_kg
         before = self._sequence
+        report = self._report()
+        if not self._at_rest.is_set() and not before.running:  # one that was aborted still moves the part
+            await self._at_rest.wait()
+            report = await self._positioner.read_report_at_rest()
+        mass_kg = report.mass_kg
+        if math.isnan(mass_kg) and self._design.defaults.mass_kg is not None:
+            mass_kg = self._design.defaults.mass_kg
         started = await self._worker.run(
             lambda: task_state_machine.begin_task(
                 before,
                 self._cell,
                 self._planner,
                 target_m=target_m,
-                position_m=status_block.position_m,
+                position_m=report.position_m,
                 mass_kg=mass_kg,
                 trained=self._trained,
             )
         )
         if self._sequence is not before:
-            raise PositioningError(f"{self._cell.name}: another task was started meanwhile")
+            raise PositioningError(f"{self._cell.name}: aborted, or another task was started, meanwhile")
         self._set_sequence(started)
         self._wake.set()
 
     async def abort(self, by: str) -> None:
-        """Stop the task that runs, and the tap that is being executed; nothing happens where none runs.
+        """Stop the task that runs, with the tap that is being executed, and one that is still being planned.
 
         Raises
         ------
@@ -143,6 +130,7 @@ class PositioningTask:
             No further tap is commanded, but the module could not be told so.
         """
         if not self._sequence.running:
+            self._sequence = replace(self._sequence)  # what `begin` plans is another's by now
             return
         self._set_sequence(task_state_machine.aborted(self._sequence, by))
         try:
@@ -152,15 +140,25 @@ class PositioningTask:
                 f"{self._cell.name}: no further tap is commanded, but the module could not be told: {error}"
             ) from error
 
-    async def redesign(self, design: CellDesign) -> None:
-        """Go on with another model of the cell; what the planner has learned of its contact stays.
+    async def redesign(self, cell: CellConfig, design: CellDesign) -> None:
+        """Go on with other limits or another model; what the planner has learned of the contact stays.
 
         What the model lacked is not told again; taps to come have to show whether the new one lacks any.
         """
-        if design.model.plant != self._design.model.plant:
-            await self._worker.run(self._planner.accept_model)
-            self._worker.belief = self._planner.posterior
-            self._predictions = self._planner.predictions
+        another_plant = design.model.plant != self._design.model.plant
+
+        def replan() -> None:
+            limits = positioning_cell(cell)
+            if limits != self._cell:
+                planner = tap_planner(cell, limits, design)
+                planner.resume(self._planner.posterior)
+                self._cell, self._planner = limits, planner
+            if another_plant:
+                self._planner.accept_model()
+
+        await self._worker.run(replan)
+        self._worker.belief = self._planner.posterior
+        self._predictions = self._planner.predictions
         self._design = design
 
     def update_friction(self, snapshot: Snapshot) -> None:
@@ -180,7 +178,11 @@ class PositioningTask:
             self._planner.observe_friction(mu_s * ratio, std, batch_changed=shifted)
 
     async def run(self) -> None:
-        """Run until cancelled."""
+        """Run until cancelled; a task whose tap was interrupted by a fault of the cell is over."""
+        if self._sequence.phase is TaskPhase.WAITING:
+            reason = f"{self._cell.name}: interrupted during tap {self._sequence.taps}; set the target again"
+            self._set_sequence(task_state_machine.failed(self._sequence, reason))
+        self._wake.set()
         async with asyncio.TaskGroup() as group:
             group.create_task(self._watch_plc(), name=f"{self._cell.name} PLC target")
             while True:
@@ -189,28 +191,51 @@ class PositioningTask:
                 await self._drive()
 
     async def _watch_plc(self) -> None:
+        stored = self._worker.handled_target
         while True:
             await self._read_plc_target()
+            if self._worker.handled_target != stored:
+                stored = self._worker.handled_target
+                await self._worker.record()
             await asyncio.sleep(WATCH_S)
 
     async def _read_plc_target(self) -> None:
-        """Start a task where the PLC has raised the sequence of its target."""
-        status_block = None if self._module.status_block is None else self._module.status_block.positioning
-        if status_block is None or status_block.target_sequence == self._plc_target:
+        """Start a task where the PLC has raised the sequence of its target.
+
+        After a restart the module may still show one whose task has ended: nobody wants that again. One that
+        was not over goes on from where the part lies.
+        """
+        block = self._module.status_block
+        shown = None if block is None else block.positioning
+        if block is None or shown is None or shown.target_sequence == self._plc_target:
             return
         if not self._module.status.connected:
             return  # it is still there once the link is up again
-        self._plc_target = status_block.target_sequence
-        if status_block.target_sequence == 0:
-            return
+        is_first, self._plc_target = self._plc_target is None, shown.target_sequence
+        target = (block.session, shown.target_sequence)
+        if is_first and block.session and target == self._worker.handled_target:
+            self._log.info("the PLC's target was done with before the restart; it is not begun again")
+        elif shown.target_sequence:
+            await self._begin_for_plc(target, shown.target_m)
+
+    async def _begin_for_plc(self, target: tuple[int, int], target_m: float) -> None:
         if self._sequence.running:
-            await self.abort(BY_PLC)
+            try:
+                await self.abort(BY_PLC)
+            except PositioningError as error:
+                self._log.warning("%s", error)
+        before = self._sequence
         try:
-            await self.begin(status_block.target_m)
+            await self.begin(target_m)
         except PositioningError as error:
             self._log.warning("the PLC's target is refused: %s", error)
-            if not self._sequence.running:  # somebody else may have set a target meanwhile
+            self._worker.handled_target = target
+            if self._sequence is before:  # nobody has set a target, or aborted, meanwhile
                 self._set_sequence(TaskState(TaskPhase.FAULTED, reason=str(error), evidence=Evidence()))
+        else:
+            self._begun_target = target
+            if not self._sequence.running:  # in place already
+                self._worker.handled_target, self._begun_target = target, None
 
     async def _drive(self) -> None:
         """Command and observe, tap by tap, until the task no longer runs."""
@@ -219,16 +244,22 @@ class PositioningTask:
             assert tap is not None  # noqa: S101 - COMMANDING has one
             waiting = task_state_machine.commanded(self._sequence)
             self._set_sequence(waiting)
+            self._at_rest.clear()
+            fault, report = "", None
             try:
-                await self._positioner.tap(TapCommand(tap.velocity_m_s, tap.stroke_m, tap.direction))
+                command = TapCommand(tap.velocity_m_s, tap.stroke_m, tap.direction)
+                await self._positioner.tap(command, lambda: self._sequence is waiting)  # noqa: B023
                 report = await self._positioner.read_report()
             except FieldbusError as error:
-                self._set_sequence(task_state_machine.failed(self._sequence, f"{self._cell.name}: {error}"))
-                return
+                fault = f"{self._cell.name}: {error}"
             except PositioningError as error:
-                self._set_sequence(task_state_machine.failed(self._sequence, str(error)))
-                return
+                fault = str(error)
+            finally:
+                self._at_rest.set()
             if self._sequence is not waiting:
+                continue  # what came of it is no other task's business
+            if report is None:
+                self._set_sequence(task_state_machine.failed(waiting, fault))
                 return
             if report.target_sequence != self._plc_target and self._plc_target is not None:
                 # Another part lies there by now: its position says nothing of the tap.
@@ -261,5 +292,7 @@ class PositioningTask:
         if now is not self._sequence:
             if self._sequence.running and not now.running:
                 self.outcomes.append(now.outcome)
+                if self._begun_target is not None:
+                    self._worker.handled_target, self._begun_target = self._begun_target, None
             self._sequence = now
             self._changed()

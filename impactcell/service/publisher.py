@@ -55,6 +55,13 @@ class CellPublisher:
         if self.server is not None:
             self.server.publish(self._cell, snapshot)
 
+    def publish_positioning(self, snapshot: Snapshot) -> None:
+        """Show the task as it is between cycles; whether the values of the last cycle are of now stays."""
+        snapshot = replace(snapshot, alarms=self._alarms, positioning=self._positioning())
+        self._put(snapshot=snapshot)
+        if self.server is not None:
+            self.server.positioning(self._cell, snapshot, time.time_ns())
+
     def publish_link(self, status: ModuleStatus) -> None:
         """Show the state of the link; without one no value is good."""
         if not status.connected:

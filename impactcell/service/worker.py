@@ -72,6 +72,8 @@ class CellWorker:
         self._state = self._fitted(design, restored.cell)
         self._snapshot = restored.snapshot
         self.belief = restored.planner
+        self.handled_target = restored.handled_target
+        """Session and sequence of the PLC's last target whose task has ended; `record` stores it."""
         self.last = restored.last
         """The last cycle taken in, durable or not; None: none ever."""
         self._told = self.alarms
@@ -175,8 +177,8 @@ class CellWorker:
         if self._journal_writer.has_backlog:
             await self.run(self._journal_writer.retry)
 
-    async def record_audit(self, audit: AuditEntry) -> None:
-        """Write down what a person did that is not in the state."""
+    async def record(self, audit: AuditEntry | None = None) -> None:
+        """Store the state now, with what a person did that is not in it."""
         await self.run(lambda: self._record((), audit))
 
     async def redesign(self, design: CellDesign) -> None:
@@ -265,7 +267,8 @@ class CellWorker:
             self.log.exception("the journal could not be tidied")
 
     def _blob(self) -> bytes:
-        return pack_state(StoredState(self._state, self._snapshot, self.belief, self.last), self._unknown)
+        stored = StoredState(self._state, self._snapshot, self.belief, self.last, self.handled_target)
+        return pack_state(stored, self._unknown)
 
     def _apply_rule_result(self, rule_result: RuleResult, time_ns: int) -> None:
         self._state, changed = core.apply_rule_result(self._design, self._state, rule_result, time_ns)

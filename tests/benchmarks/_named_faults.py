@@ -141,7 +141,7 @@ NAMED_FAULTS: Final = (
     NamedFault(
         "positioning commands not in the journal's audit",
         "impactcell/service/cell_task.py",
-        "await self.worker.record_audit(audit)",
+        "await self.worker.record(audit)",
         "pass",
         ("tests/unit/service",),
     ),

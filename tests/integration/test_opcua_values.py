@@ -3,6 +3,7 @@
 import asyncio
 import math
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,7 +11,7 @@ from asyncua import Client, ua
 
 from impactcell.alarms import NAMES
 from impactcell.quantities import CYCLE, FOLDERS, MODULE
-from impactcell.records import ModuleStatus, Quality
+from impactcell.records import ModuleStatus, PositioningState, Quality
 from tests.opcua_server import CELL, START_NS, Site, site
 from tests.patience import PATIENCE_S
 
@@ -177,7 +178,7 @@ async def test_status_value_and_time() -> None:
         bad = await _read(here, client, "Friction/StaticFriction")
         assert bad.StatusCode.value == codes.Bad
         assert bad.Value.Value == 0.21, "the last value is kept"
-        here.publish(0.22)
+        snapshot = here.publish(0.22)
         here.server.mark_stale(CELL, time.time_ns())
         assert (await _read(here, client, "Wear/Level")).StatusCode.value == (
             codes.UncertainNoCommunicationLastUsableValue
@@ -185,6 +186,12 @@ async def test_status_value_and_time() -> None:
         here.server.mark_bad(CELL, time.time_ns())
         lost = await _read(here, client, "Friction/StaticFriction")
         assert (lost.StatusCode.value, lost.Value.Value) == (codes.BadNoCommunication, 0.22)
+        task = PositioningState(target_m=0.008, remaining_m=0.002)
+        here.server.positioning(CELL, replace(snapshot, positioning=task), time.time_ns())
+        target = await _read(here, client, "Positioning/Target")
+        assert (target.StatusCode.is_good(), target.Value.Value) == (True, pytest.approx(8.0))
+        lost = await _read(here, client, "Friction/StaticFriction")
+        assert lost.StatusCode.value == codes.BadNoCommunication, "a task says nothing of the last cycle"
         here.server.module(CELL, ModuleStatus(connected=False, received=5, missed=1), time.time_ns())
         assert (await _read(here, client, "Module/Connected")).Value.Value is False
         assert (await _read(here, client, "Module/RoundTripTime")).StatusCode.is_bad()

@@ -86,6 +86,41 @@ async def test_a_tap_is_made_once_and_tells_its_cycle(fpga: RegisterMap) -> None
     assert device.taps[0] == pytest.approx((0.05, 0.0012, -1), rel=1e-6)
 
 
+async def test_a_tap_that_is_aborted_before_its_command_is_never_made(fpga: RegisterMap) -> None:
+    """Its parameters are in the module already, or the link is down meanwhile: nothing may come after it."""
+    device, wanted = PositioningDevice(fpga), [True]
+    take, velocity = device.write, fpga["command_velocity"].address
+
+    def write(address: int, words: Words) -> None:
+        take(address, words)
+        if address <= velocity < address + len(words):
+            wanted[0] = False
+
+    device.write = write  # type: ignore[method-assign]
+    async with ready(fpga, device) as (_, _, positioner):
+        with pytest.raises(PositioningError, match="aborted; nothing has been commanded"):
+            await positioner.tap(COMMAND, lambda: wanted[0])
+        assert device.taps == []
+        assert await positioner.tap(COMMAND) == 1
+
+
+async def test_a_report_at_rest_is_one_of_a_module_that_is_ready(fpga: RegisterMap) -> None:
+    device = PositioningDevice(fpga)
+    device.put("positioning_state", 2)
+    async with ready(fpga, device) as (_, module, positioner):
+        reading = asyncio.create_task(positioner.read_report_at_rest())
+        while module.status_block is None or module.status_block.positioning is None:
+            await module.read_status()
+        assert not reading.done()
+        device.put("part_position", 0.004)
+        device.put("positioning_state", 1)
+        assert (await reading).position_m == pytest.approx(0.004)
+    device.put("positioning_state", 2)
+    async with ready(fpga, device, patience_s=0.2) as (_, _, positioner):
+        with pytest.raises(PositioningError, match="has not been ready for"):
+            await positioner.read_report_at_rest()
+
+
 async def test_the_command_after_the_last_number_is_the_first_and_never_none(fpga: RegisterMap) -> None:
     """0 stands for no command: a module would never act on it."""
     device = PositioningDevice(fpga)

@@ -1,25 +1,17 @@
 """A PLC that takes a part away before the outcome of its last tap has been read."""
 
 import asyncio
-from collections.abc import AsyncIterator
-from dataclasses import replace
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 import pytest_asyncio
 
-from impactcell.fieldbus.acquisition import ModuleAcquisition, ModuleStatus
-from impactcell.fieldbus.modbus_client import ModbusClient
-from impactcell.fieldbus.status_block import PositioningStatus, StatusBlock
-from impactcell.fieldbus.transports import transport_for
-from impactcell.journal.retention import Retention
-from impactcell.journal.store import Journal
-from impactcell.service.factory import cell_design, module_link
+from impactcell.fieldbus.status_block import PositioningStatus
 from impactcell.service.positioning import PositioningTask
-from impactcell.service.worker import CellWorker
 from impactcell.settings import CellConfig, read_cell
 from tests.integration.processes import CONFIG
+from tests.told_module import ToldModule, block, task_of, worker_of
 
 
 @pytest.fixture(scope="module")
@@ -27,49 +19,26 @@ def cell() -> CellConfig:
     return read_cell(CONFIG / "cells" / "positioning.yaml")
 
 
-def block(**changed: Any) -> StatusBlock:
-    positioning = PositioningStatus(
-        state="ready", accepted_command=0, result="none", cycle=0, position_m=0.0, mass_kg=18.9,
-        target_m=0.01, target_sequence=1,
-    )  # fmt: skip
-    return StatusBlock("ready", 1, 0, (), None, replace(positioning, **changed))
-
-
-class Module(ModuleAcquisition):
-    """Shows what it is told to show."""
-
-    shown, connected = block(), True
-
-    @property
-    def status(self) -> ModuleStatus:
-        return ModuleStatus(connected=self.connected)
-
-    async def read_status(self) -> StatusBlock:
-        self.status_block = self.shown
-        return self.shown
-
-
 @pytest.fixture
-def module(cell: CellConfig) -> Module:
-    return Module(cell.name, ModbusClient(transport_for(module_link(cell))), cell.register_map)
+def module(cell: CellConfig) -> ToldModule:
+    return ToldModule.of(cell)
 
 
 @pytest_asyncio.fixture
-async def task(tmp_path: Path, cell: CellConfig, module: Module) -> AsyncIterator[PositioningTask]:
-    design = cell_design(cell)
-    worker = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
-    yield PositioningTask(cell, design, module, worker, lambda: None)
+async def task(tmp_path: Path, cell: CellConfig, module: ToldModule) -> AsyncIterator[PositioningTask]:
+    worker = worker_of(cell, tmp_path / "j")
+    yield task_of(cell, module, worker)
     await worker.close()
 
 
 class Tapper:
     """Moves the part as foretold; the PLC puts another down after the first tap, or lets it lie."""
 
-    def __init__(self, module: Module, task: PositioningTask, *, taken_away: bool) -> None:
+    def __init__(self, module: ToldModule, task: PositioningTask, *, taken_away: bool) -> None:
         self.module, self.task, self.taken_away, self.taps = module, task, taken_away, 0
         self.position_m = 0.0
 
-    async def tap(self, command: object) -> int:
+    async def tap(self, command: object, is_wanted: Callable[[], bool] = lambda: True) -> int:
         self.taps += 1
         tap = self.task._sequence.tap
         assert tap is not None
@@ -85,7 +54,7 @@ class Tapper:
 
 @pytest.mark.parametrize("taken_away", [True, False])
 async def test_the_next_part_is_not_taken_for_the_one_that_was_tapped(
-    module: Module, task: PositioningTask, taken_away: bool
+    module: ToldModule, task: PositioningTask, taken_away: bool
 ) -> None:
     tapper = Tapper(module, task, taken_away=taken_away)
     task._positioner = tapper  # type: ignore[assignment]
@@ -102,7 +71,7 @@ async def test_the_next_part_is_not_taken_for_the_one_that_was_tapped(
 
 
 async def test_a_target_that_came_while_the_link_was_down_is_begun_once_it_is_up(
-    module: Module, task: PositioningTask
+    module: ToldModule, task: PositioningTask
 ) -> None:
     await module.read_status()
     module.connected = False
@@ -115,7 +84,7 @@ async def test_a_target_that_came_while_the_link_was_down_is_begun_once_it_is_up
 
 
 async def test_a_refused_target_of_the_plc_ends_no_task_that_a_person_has_started_meanwhile(
-    module: Module, task: PositioningTask
+    module: ToldModule, task: PositioningTask
 ) -> None:
     await module.read_status()
     await asyncio.gather(task.begin(0.005), task._read_plc_target())

@@ -79,10 +79,10 @@ async def test_a_model_that_is_accepted_clears_what_taps_said_of_the_one_before(
     worker.belief = lacking
     task = task_of(cell, design, worker)
     assert task.state.predictions.lacking
-    await task.redesign(design)  # settings were read again, the model is the same
+    await task.redesign(cell, design)  # settings were read again, the model is the same
     assert task.state.predictions.lacking
     plant = replace(design.model.plant, stiffness_n_per_m=1.01 * design.model.plant.stiffness_n_per_m)
-    await task.redesign(replace(design, model=replace(design.model, plant=plant)))
+    await task.redesign(cell, replace(design, model=replace(design.model, plant=plant)))
     assert not task.state.predictions.lacking
     assert worker.belief is task.belief
     await worker.close()

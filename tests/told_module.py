@@ -1,0 +1,56 @@
+"""A module that shows what a test tells it to, for the positioning task of a cell."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from impactcell.fieldbus.acquisition import ModuleAcquisition, ModuleStatus
+from impactcell.fieldbus.modbus_client import ModbusClient
+from impactcell.fieldbus.status_block import PositioningStatus, StatusBlock
+from impactcell.fieldbus.transports import transport_for
+from impactcell.journal.retention import Retention
+from impactcell.journal.store import Journal
+from impactcell.service.factory import cell_design, module_link
+from impactcell.service.positioning import PositioningTask
+from impactcell.service.worker import CellWorker
+from impactcell.settings import CellConfig
+
+
+def block(**changed: Any) -> StatusBlock:
+    """Return what a ready module shows of a part at 0, wanted at 10 mm."""
+    positioning = PositioningStatus(
+        state="ready", accepted_command=0, result="none", cycle=0, position_m=0.0, mass_kg=18.9,
+        target_m=0.01, target_sequence=1,
+    )  # fmt: skip
+    return StatusBlock("ready", 1, 0, (), None, replace(positioning, **changed))
+
+
+class ToldModule(ModuleAcquisition):
+    """Shows what it is told to show."""
+
+    shown, connected = block(), True
+
+    @classmethod
+    def of(cls, cell: CellConfig) -> "ToldModule":
+        """Make the module of a cell; nothing is ever sent to it."""
+        return cls(cell.name, ModbusClient(transport_for(module_link(cell))), cell.register_map)
+
+    @property
+    def status(self) -> ModuleStatus:
+        """Whether it is connected is told, too."""
+        return ModuleStatus(connected=self.connected)
+
+    async def read_status(self) -> StatusBlock:
+        """Show it."""
+        self.status_block = self.shown
+        return self.shown
+
+
+def worker_of(cell: CellConfig, journal: Path) -> CellWorker:
+    """Open a worker of the cell on a journal."""
+    return CellWorker(cell_design(cell), Journal(journal, cell.name), Retention())
+
+
+def task_of(cell: CellConfig, module: ModuleAcquisition, worker: CellWorker) -> PositioningTask:
+    """Make the task of the cell."""
+    return PositioningTask(cell, cell_design(cell), module, worker, lambda: None)
