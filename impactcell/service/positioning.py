@@ -70,7 +70,7 @@ class PositioningTask:
         self._begun_target: tuple[int, int] | None = None  # session and sequence of the one whose task runs
         self._at_rest = asyncio.Event()  # no tap is under way, also none that was aborted
         self._at_rest.set()
-        self._batch_shift_cycle = 0
+        self._batch_shift_cycle = worker.snapshot.batch.last_shift_cycle if worker.snapshot else 0
 
     @property
     def state(self) -> PositioningState:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from impactcell.service.positioning import PositioningTask
 from impactcell.service.worker import CellWorker
 from impactcell.settings import CellConfig, read_cell
 from tests.integration.processes import CONFIG
-from tests.snapshots import make_capture
+from tests.snapshots import make_capture, make_snapshot
 
 
 @pytest.fixture(scope="module")
@@ -85,4 +86,21 @@ async def test_a_model_that_is_accepted_clears_what_taps_said_of_the_one_before(
     await task.redesign(cell, replace(design, model=replace(design.model, plant=plant)))
     assert not task.state.predictions.lacking
     assert worker.belief is task.belief
+    await worker.close()
+
+
+async def test_a_shift_of_the_batch_before_a_restart_is_no_news_after_it(
+    tmp_path: Path, cell: CellConfig
+) -> None:
+    """What taps have shown of the friction would be given up for it."""
+    design = cell_design(cell)
+    worker = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
+    snapshot = make_snapshot(make_capture(7))
+    shifted = replace(snapshot, batch=replace(snapshot.batch, last_shift_cycle=5))
+    worker._snapshot = shifted
+    task = task_of(cell, design, worker)
+    with patch.object(type(task._planner), "observe_friction") as told:
+        task.update_friction(shifted)
+        task.update_friction(replace(shifted, batch=replace(shifted.batch, last_shift_cycle=8)))
+    assert [call.kwargs["batch_changed"] for call in told.call_args_list] == [False, True]
     await worker.close()
