@@ -1,6 +1,7 @@
 """What a map file may say of a register, and the layout that comes with the product."""
 
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -10,9 +11,16 @@ from impactcell.fieldbus.map_registers import CONSTANTS, MEASURED, NEEDED_BY, RE
 from impactcell.fieldbus.map_validation import _KEYS
 from impactcell.fieldbus.register_types import KINDS, SI_FACTOR
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.fieldbus.status_block import _BATCH, _POSITIONING
+from impactcell.fieldbus.tap_commands import _PARAMETERS
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ROOT / "config" / "maps" / "fpga-v1.yaml"
+IN_COLUMNS = ("address", "type", "count", "length", "unit", "writable", "description")
+"""Keys of an entry that have a column of their own."""
+WORDS = """\
+Names in `codes` that are compared word for word: `ready` of `positioning_state`, `executing` and `done` of
+`command_result`. [What each register has to do](../how-to/positioning.md)."""
 
 
 def keys() -> str:
@@ -23,10 +31,11 @@ def keys() -> str:
         (
             code(name),
             str(register["address"]),
-            register["type"] + (f" × {register['count']}" if register.get("count", 1) > 1 else ""),
+            _type(register),
             register.get("unit", ""),
             "yes" if register.get("writable") else "",
             register.get("description", ""),
+            _further(register),
         )
         for name, register in shipped.items()
     ]
@@ -39,13 +48,44 @@ def keys() -> str:
             f"With `value` (and `unit`) in its place, what is always the same: {constants}.",
             "## What is required, and why",
             table(("register", "what it proves or gives"), _required()),
+            "## What works only together",
+            table(("for", "registers, all of them"), _together()),
+            WORDS,
             "## What is then not promised",
             "As `impactcell check`, `impactcell probe` and the log say it of the maps of poorer modules:",
             table(("map", "not promised"), _promises()),
             "## The layout `fpga-v1`",
-            table(("register", "address", "type", "unit", "writable", "meaning"), rows),
+            table(("register", "address", "type", "unit", "writable", "meaning", "further keys"), rows),
         ]
     )
+
+
+def _type(register: dict[str, Any]) -> str:
+    """Say the type, and how many values or registers there are of it."""
+    if "length" in register:
+        return f"{register['type']}, {register['length']} registers"
+    return register["type"] + (f" × {register['count']}" if register.get("count", 1) > 1 else "")
+
+
+def _further(register: dict[str, Any]) -> str:
+    """Give what else the map says of a register."""
+    said = []
+    for key, value in register.items():
+        if isinstance(value, dict):
+            said.append(f"{key}: " + ", ".join(f"{code_} {name}" for code_, name in value.items()))
+        elif key not in IN_COLUMNS:
+            said.append(f"{key}: {value}")
+    return "; ".join(said)
+
+
+def _together() -> list[tuple[str, str]]:
+    """Say which registers are of no use without each other."""
+    groups = {
+        "batches that the PLC announces": _BATCH,
+        "positioning": (*_POSITIONING, *_PARAMETERS, "command_sequence"),
+        "stopping the tap that is under way": ("command_abort",),
+    }
+    return [(purpose, ", ".join(map(code, names))) for purpose, names in groups.items()]
 
 
 def _required() -> list[tuple[str, str]]:

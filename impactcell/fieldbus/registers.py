@@ -2,7 +2,7 @@
 
 Pure: a map is a value made from a mapping (the parsed map file), used by the service and the simulator alike.
 A value is in SI on this side; a map's `scale` and `unit` say what the wire carries:
-SI value = raw code × scale × SI factor of the unit.
+SI value = (raw code × scale + offset) × SI factor of the unit.
 """
 
 import zlib

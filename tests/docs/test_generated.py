@@ -8,8 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 
 from impactcell.alarms import RULES
+from impactcell.fieldbus.registers import RegisterMap
 from impactcell.quantities import HISTORY
 from impactcell.settings import schema
 from tests.between_workers import computed_once
@@ -102,6 +104,28 @@ def test_nodes_and_conditions_are_listed(pages: dict[str, str]) -> None:
     for name, rule in RULES.items():
         assert f"| `{name}` | {rule.settings.severity} |" in pages["alarms.md"]
     assert "| `cycle_counter` | 36 | u32 |" in pages["register_map.md"]
+
+
+def test_a_register_is_listed_with_all_that_its_map_says(pages: dict[str, str]) -> None:
+    rows = {row.split("`")[1]: row for row in pages["register_map.md"].splitlines() if row.startswith("| `")}
+    assert "string, 8 registers" in rows["module_name"]
+    assert "expect: IMPACT-FPGA" in rows["module_name"]
+    assert "scale: 0.025; saturation: [-32767, 32767]; not_a_number: -32768" in rows["force"]
+    assert "codes: 0 none, 1 executing, 2 done, 3 refused value" in rows["command_result"]
+
+
+def test_registers_that_need_each_other_are_listed(pages: dict[str, str]) -> None:
+    _, found, rest = pages["register_map.md"].partition("## What works only together")
+    assert found
+    (positioning,) = (row for row in rest.splitlines() if row.startswith("| positioning |"))
+    registers = RegisterMap.from_mapping(
+        yaml.safe_load((ROOT / "config" / "maps" / "fpga-v1.yaml").read_text(encoding="utf-8"))
+    )
+    told = set(re.findall(r"`(\w+)`", positioning))
+    of_positioning = {
+        name for name in registers.registers if re.match("positioning|command|target|part", name)
+    }
+    assert told == of_positioning - {"command_abort"}
 
 
 def test_an_outside_request_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
