@@ -9,5 +9,13 @@ def rules() -> str:
     rows = []
     for name, rule in RULES.items():
         chosen = rule.settings
-        rows.append((code(name), str(chosen.severity), str(chosen.on_delay), str(chosen.off_delay)))
-    return table(("condition", "severity", "on-delay, cycles", "off-delay, cycles"), rows)
+        is_set = "yes" if rule.evaluate is not None else ""
+        rows.append((code(name), str(chosen.severity), str(chosen.on_delay), str(chosen.off_delay), is_set))
+    columns = (
+        "condition",
+        "severity",
+        "on-delay, cycles",
+        "off-delay, cycles",
+        "delays set by the cell file",
+    )
+    return table(columns, rows)

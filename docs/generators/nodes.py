@@ -12,6 +12,10 @@ TYPES = "{http://opcfoundation.org/UA/2008/02/Types.xsd}"
 KINDS = ("UAVariable", "UAMethod")
 PROPERTIES = ("EURange", "EngineeringUnits", "InputArguments")
 """Nodes below a variable or method that its own row tells of."""
+CONDITION, CONDITION_TYPE = "<condition>", "ImpactCellAlarmType"
+"""What stands for the name of each condition, and the type that declares what all of them have."""
+ARRAY = "1"
+"""ValueRank of an array of one dimension."""
 DATA_TYPES = {
     "i=1": "Boolean",
     "i=11": "Double",
@@ -26,6 +30,11 @@ def variables() -> str:
     """Write a row a node that has a description, in the order of the file."""
     root = ET.parse(NODESET).getroot()  # our own file
     objects = {node.attrib["NodeId"]: _name(node) for node in root.iter(f"{UA}UAObject")}
+    objects |= {
+        node.attrib["NodeId"]: CONDITION
+        for node in root.iter(f"{UA}UAObjectType")
+        if _name(node) == CONDITION_TYPE
+    }
     below = {(node.attrib.get("ParentNodeId"), _name(node)): node for node in root.iter(f"{UA}UAVariable")}
     rows = []
     for node in root:
@@ -35,15 +44,30 @@ def variables() -> str:
             continue
         folder = objects.get(node.attrib.get("ParentNodeId", ""))
         arguments = below.get((node.attrib["NodeId"], "InputArguments"))
-        typed = _arguments(arguments) if kind == "UAMethod" else node.attrib.get("DataType", "")
+        typed = _arguments(arguments) if kind == "UAMethod" else _data_type(node)
         path = f"{folder}/{name}" if folder else name
         history = "yes" if node.attrib.get("Historizing") == "true" else ""
-        rows.append((code(path), kind.removeprefix("UA").lower(), typed, history, description))
-    return table(("path below the cell", "kind", "type, or arguments", "history", "description"), rows)
+        unit = _unit(below.get((node.attrib["NodeId"], "EngineeringUnits")))
+        rows.append((code(path), kind.removeprefix("UA").lower(), typed, unit, history, description))
+    return table(
+        ("path below the cell", "kind", "type, or arguments", "unit", "history", "description"), rows
+    )
 
 
 def _name(node: ET.Element) -> str:
     return node.attrib.get("BrowseName", "").split(":", 1)[-1]
+
+
+def _data_type(node: ET.Element) -> str:
+    """Say the type of a variable; an array as `Double[]`."""
+    return node.attrib.get("DataType", "") + ("[]" if node.attrib.get("ValueRank") == ARRAY else "")
+
+
+def _unit(node: ET.Element | None) -> str:
+    """Say the unit as people write it; 1 of a pure number."""
+    if node is None:
+        return ""
+    return node.findtext(f".//{TYPES}EUInformation/{TYPES}DisplayName/{TYPES}Text") or "1"
 
 
 def _arguments(node: ET.Element | None) -> str:
