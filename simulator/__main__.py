@@ -24,15 +24,19 @@ def _parser() -> argparse.ArgumentParser:
     )
     verbs = parser.add_subparsers(title="verbs", required=True, metavar="VERB")
     campaign = verbs.add_parser("campaign", help="write a campaign directory and its truth")
-    campaign.add_argument("scenario", type=Path, metavar="SCENARIO.yaml")
-    campaign.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    campaign.add_argument("--hide", action="append", default=[], metavar="EFFECT", help="repeatable")
+    campaign.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="as config/sim/campaign.yaml")
+    campaign.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="DIR", help="a directory that is not there yet"
+    )
+    campaign.add_argument(
+        "--hide", action="append", default=[], metavar="EFFECT", help="effect that acts; repeatable"
+    )
     campaign.add_argument("--seed", type=int, help="in place of the scenario's")
     campaign.add_argument("-q", "--quiet", action="store_true", help="say nothing")
     campaign.add_argument("-v", "--verbose", action="store_true", help="say what is hidden")
     campaign.set_defaults(run=_campaign)
     serve = verbs.add_parser("serve", help="serve a scenario over Modbus TCP until SIGTERM")
-    serve.add_argument("scenario", type=Path, metavar="SCENARIO.yaml")
+    serve.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="as config/sim/prototype.yaml")
     serve.add_argument("--port", type=_port, help="in place of the scenario's; 0 lets the system choose")
     serve.add_argument(
         "--truth", type=Path, metavar="FILE", help="write what really happened, a JSON line a cycle"

@@ -24,14 +24,17 @@ def users_add(
         Path | None, typer.Option(metavar="FILE", help="Log in by this certificate instead of a password.")
     ] = None,
 ) -> None:
-    """Add a user or change one; the password is asked for, or read from standard input."""
+    """Add a user or change one; the password is asked for, or read from standard input.
+
+    With `--certificate` none is asked for.
+    """
     from impactcell.cli.access import add_user
 
     add_user(file, name, role, certificate)
 
 
 @verb(users, "remove")
-def users_remove(file: UsersFile, name: Annotated[str, typer.Argument()]) -> None:
+def users_remove(file: UsersFile, name: Annotated[str, typer.Argument(help="As typed at login.")]) -> None:
     """Remove a user; sessions that are open end within a second."""
     from impactcell.cli.access import remove_user
 
@@ -71,7 +74,10 @@ def certs_trust(
     *,
     pki: Annotated[Path | None, typer.Option(metavar="DIR", help="Where FILE is not inside one.")] = None,
 ) -> None:
-    """Trust a client's certificate; takes effect without a restart."""
+    """Trust a client's certificate; takes effect without a restart.
+
+    `--pki` is needed where FILE lies in no folder `rejected`.
+    """
     from impactcell.cli.access import trust_cert
 
     trust_cert(file, pki)

@@ -103,7 +103,10 @@ def init(
         Path | None, typer.Option(metavar="CAMPAIGN", help="Taps to fit the first model to.")
     ] = None,
 ) -> None:
-    """Begin a cell: write its cell file, register map and first model; asks for what is not said."""
+    """Begin a cell: write its cell file, register map and first model; asks for what is not said.
+
+    Without a terminal `--mass-kg`, `--stroke-mm` and `--wear-limit` have to be said.
+    """
     from impactcell.cli.init import QUESTIONS, ask
     from impactcell.cli.init import init as run_init
 
@@ -198,14 +201,18 @@ def discrepancy(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find where model and measurement disagree, name the missing effect, prove it."""
+    """Find where model and measurement disagree, name the missing effect, prove it.
+
+    Of CAMPAIGN and `--journal` one is named. With `--base` only CAMPAIGN, `--train`, `--test`, `--seed` and
+    `--json` go; `--train` and `--test` go only with it.
+    """
     from impactcell.cli.discrepancy import discrepancy as run_discrepancy
     from impactcell.cli.discrepancy import discrepancy_of_machine
     from impactcell.cli.effects import offer
     from impactcell.errors import CampaignError
 
     if base is not None:
-        if campaign is None or cell is not None or scheduler is not None or effects:
+        if campaign is None or journal or cell or scheduler is not None or effects:
             raise CampaignError("--base goes with a campaign, --train, --test and --seed alone")
         discrepancy_of_machine(campaign, output, base, patterns=(train, test), seed=seed, as_json=as_json)
         return

@@ -41,7 +41,8 @@ def import_files(
     mapping: Annotated[
         Path | None,
         typer.Option(
-            metavar="MAP.yaml", help="Says the same: columns, units, gains, signs, delays, constants."
+            metavar="MAP.yaml",
+            help="Says the same: columns, units, gains, signs, delays, constants, excitation, trigger.",
         ),
     ] = None,
     excitation: Annotated[str | None, typer.Option(help="tap, free_slide or driven.")] = None,
@@ -53,7 +54,11 @@ def import_files(
     encoding: Annotated[str | None, typer.Option(help="Of a text file.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print what was guessed as JSON.")] = False,
 ) -> None:
-    """Make a campaign of measurement files; what is guessed of columns, units and shots is shown."""
+    """Make a campaign of measurement files; what is guessed of columns, units and shots is shown.
+
+    `--output` or `--dry-run` is needed; with both nothing is written. An option goes before what `--mapping`
+    says.
+    """
     from impactcell.cli.import_files import ImportOptions, named_dialect
     from impactcell.cli.import_files import import_files as run_import
 

@@ -48,7 +48,10 @@ def model_fit(
     anyway: Annotated[bool, typer.Option("--anyway", help="Also if it is not good enough.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Fit a cell's first model to its own first taps, and put it into service; says if it is good enough."""
+    """Fit a cell's first model to its own first taps, and put it into service; says if it is good enough.
+
+    `--taps` is of the journal, and counts for nothing beside `--campaign`.
+    """
     from impactcell.cli.first_model import fit_model
 
     fit_model(cell, campaign, taps, anyway=anyway, as_json=as_json)

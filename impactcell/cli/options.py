@@ -28,7 +28,7 @@ _VERBOSITY = {
     ],
 }
 Cells = Annotated[list[Path], typer.Argument(metavar="CELL.yaml", help="One file a cell.")]
-Cell = Annotated[Path, typer.Argument(metavar="CELL.yaml")]
+Cell = Annotated[Path, typer.Argument(metavar="CELL.yaml", help="A cell file.")]
 OptionalCell = Annotated[
     Path | None, typer.Option("--cell", metavar="CELL.yaml", help="Use this cell's model.")
 ]

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from impactcell import campaign as campaigns
 from impactcell.campaign import Campaign
+from impactcell.cli.app import app
 from impactcell.cli.discrepancy import discrepancy
 from impactcell.discrepancy.data.prepared_campaign import prepare
 from impactcell.discrepancy.report.result import result_document
@@ -86,6 +88,16 @@ def test_a_campaign_and_a_journal_exclude_each_other(tmp_path: Path, both: bool)
     given = tmp_path if both else None
     with pytest.raises(CampaignError, match="either a campaign directory or --journal"):
         discrepancy(given, tmp_path / "out", journal=given)
+
+
+@pytest.mark.parametrize(
+    "besides", [["--journal", "j"], ["--cell", "c.yaml"], ["--scheduler", "tcp://x"], ["--effects", "e.py"]]
+)
+def test_what_does_not_go_with_a_base_model_is_refused(tmp_path: Path, besides: list[str]) -> None:
+    given = ["discrepancy", str(tmp_path), "--base", "base.yaml", "-o", str(tmp_path / "out"), *besides]
+    refused = CliRunner().invoke(app, given).exception
+    assert isinstance(refused, CampaignError)
+    assert str(refused) == "--base goes with a campaign, --train, --test and --seed alone"
 
 
 def test_an_empty_journal_is_said_by_name(tmp_path: Path) -> None:

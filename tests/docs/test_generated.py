@@ -12,6 +12,7 @@ import yaml
 
 from impactcell.alarms import RULES
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.process.exit_codes import ExitCode
 from impactcell.quantities import CYCLE, HISTORY, MODULE
 from impactcell.settings import schema
 from tests.between_workers import computed_once
@@ -86,6 +87,15 @@ def test_every_verb_is_listed(pages: dict[str, str]) -> None:
     for verb in ("demo", "run", "check", "estimate", "track", "discrepancy", "users add", "model accept"):
         assert f"## impactcell {verb}\n" in pages["command_line.md"]
     assert "| `--seed SEED` | Of the resampling. | `0` |" in pages["command_line.md"]
+    assert "| `-o, --output DIR` | Where to write. | required |" in pages["command_line.md"]
+    assert "[[" not in pages["command_line.md"]
+
+
+def test_the_simulator_and_the_exit_codes_are_listed(pages: dict[str, str]) -> None:
+    for verb in ("campaign", "serve"):
+        assert f"## python -m simulator {verb}\n" in pages["command_line.md"]
+    for exit_code in ExitCode:
+        assert f"| {int(exit_code)} |" in pages["command_line.md"]
 
 
 def test_every_key_of_a_cell_file_is_listed(pages: dict[str, str]) -> None:
