@@ -209,7 +209,7 @@ def tap_planner(
 ) -> TapPlanner:
     """Make the planner of a cell, which has learned nothing yet."""
     settings, limits = cell.settings.positioning, limited.limits
-    assert settings is not None  # noqa: S101 - `_positioning_cell` has looked
+    assert settings is not None  # noqa: S101 - `positioning_cell` has looked
     return TapPlanner(
         tolerance_m=settings.tolerance_um * 1e-6,
         max_velocity_m_s=limits.velocity_m_s,
