@@ -127,7 +127,7 @@ def onset_within_sample(
     time, force : list of ndarray
         Of each tap, s and N without offset.
     onsets : list of int
-        First sample of contact.
+        First sample of contact; at least one without contact comes before it.
     velocities : list of float
         Of the actuator, m/s.
     """

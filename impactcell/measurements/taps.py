@@ -1,8 +1,9 @@
 """Cuts records into taps: where contact begins is t = 0, what lay before is kept as pretrigger."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -26,7 +27,8 @@ NO_TRIGGER = "none"
 class _TapRecord:
     """One tap of a record.
 
-    `onset` is the index of the first force sample in contact, None where the record has no sample before it.
+    `onset` is the index of the first force sample in contact; None where contact is at the record's own
+    t = 0.
     """
 
     record: Record
@@ -46,12 +48,18 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
     faults: list[str] = []
     signed = _signed(records, given, notes)
     taps: list[_TapRecord] = []
+    left_out: list[str] = []
     for record in signed:
-        taps += _taps(record, given, faults)
+        taps += _taps(record, given, faults, left_out)
     raise_faults(faults)
     if len(taps) > len(records):
         told = "1 record" if len(records) == 1 else f"{len(records)} records"
         notes.append(f"{told} cut into {len(taps)} taps where the force begins anew")
+    if left_out:
+        told = (
+            f"in {Path(left_out[0]).name}" if len(left_out) == 1 else f"the first in {Path(left_out[0]).name}"
+        )
+        notes.append(f"taps left out whose beginning was not recorded: {len(left_out)}, {told}")
     if not any(ColumnMeaning.POSITION in record.values for record in records):
         notes.append(
             "no position was recorded: such taps tell mu_s by peak force and the model of a cell, and no "
@@ -78,7 +86,7 @@ def _signed(records: Sequence[Record], given: Given, notes: list[str]) -> list[R
     return turned
 
 
-def _taps(record: Record, given: Given, faults: list[str]) -> list[_TapRecord]:
+def _taps(record: Record, given: Given, faults: list[str], left_out: list[str]) -> list[_TapRecord]:
     time, force = record.times[ColumnMeaning.FORCE], record.values[ColumnMeaning.FORCE]
     if given.trigger == NO_TRIGGER:
         return _with_velocity([(record, None)], given, faults)
@@ -91,17 +99,16 @@ def _taps(record: Record, given: Given, faults: list[str]) -> list[_TapRecord]:
             f"{baseline.noise_std:.2g} N); give its threshold with --trigger, or --excitation driven"
         )
         return []
-    if len(onsets) == 1 and onsets[0] == 0:
-        return _with_velocity([(record, None)], given, faults)
-    parts: list[tuple[Record, int | None]] = []
-    for number, onset in enumerate(onsets):
-        if onset == 0:
-            continue  # a tap whose beginning was not recorded
-        if len(onsets) == 1:
-            parts.append((record, onset))
-            continue
-        end_s = float(time[onsets[number + 1]]) - contacts.REST_S if number + 1 < len(onsets) else math.inf
+    if len(onsets) == 1:
+        begins_at_contact = onsets[0] == 0 and 0.0 <= time[0] < contacts.REST_S
+        return _with_velocity([(record, None if begins_at_contact else onsets[0])], given, faults)
+    parts: list[tuple[Record, int]] = []
+    for onset, after in zip(onsets, (*onsets[1:], None), strict=True):
+        end_s = math.inf if after is None else float(time[after]) - contacts.REST_S
         parts.append(_part(record, onset, _end(record, float(time[onset]), end_s)))
+    if onsets[0] == 0 and any(onset >= contacts.CONFIRMING_SAMPLES for _, onset in parts):
+        left_out.append(record.place)  # of the others the beginning was recorded
+        del parts[0]
     return _with_velocity(parts, given, faults)
 
 
@@ -163,7 +170,7 @@ def _slope(record: Record, onset: int | None) -> float:
 
 def _contact_times(taps: Sequence[_TapRecord], notes: list[str]) -> list[float]:
     """Time of first contact of each tap in its record [s]."""
-    triggered = [tap for tap in taps if tap.onset is not None]
+    triggered = [tap for tap in taps if tap.onset]
     if triggered:
         times, forces, onsets, velocities = [], [], [], []
         for tap in triggered:
@@ -181,11 +188,18 @@ def _contact_times(taps: Sequence[_TapRecord], notes: list[str]) -> list[float]:
         )
     else:
         refined = iter(())
-    started = (
-        [] if len(triggered) == len(taps) else ["no samples before contact: the records' own t = 0 is taken"]
-    )
-    notes += started
-    return [0.0 if tap.onset is None else next(refined) for tap in taps]
+    if cut_off := sum(tap.onset == 0 for tap in taps):
+        told = "1 tap" if cut_off == 1 else f"{cut_off} taps"
+        notes.append(f"contact is there from the first sample on in {told}: that is taken for t = 0")
+    if any(tap.onset is None for tap in taps):
+        notes.append("no samples before contact: the records' own t = 0 is taken")
+    return [_start_of(tap, refined) for tap in taps]
+
+
+def _start_of(tap: _TapRecord, refined: Iterator[float]) -> float:
+    if tap.onset is None:
+        return 0.0
+    return next(refined) if tap.onset else float(tap.record.times[ColumnMeaning.FORCE][0])
 
 
 def _rest_force(force: Samples, onset: int | None) -> float:

@@ -38,6 +38,12 @@ GERMAN: Final = {
     r"what lies before is kept as pretrigger":
         r"t = 0 liegt, wo die Kraft beginnt (Stöße: \1), genau auf einen Teil des Abtastschritts von \2 ms; "
         "was davor liegt, bleibt erhalten",
+    r"contact is there from the first sample on in (\d+) taps?: that is taken for t = 0":
+        r"Kontakt ab dem ersten Messwert (Stöße: \1): dieser gilt als t = 0",
+    r"taps left out whose beginning was not recorded: (\d+), in (.+)":
+        r"weggelassene Stöße, deren Beginn nicht aufgezeichnet wurde: \1, in \2",
+    r"taps left out whose beginning was not recorded: (\d+), the first in (.+)":
+        r"weggelassene Stöße, deren Beginn nicht aufgezeichnet wurde: \1, zuerst in \2",
     r"no samples before contact: the records' own t = 0 is taken":
         "keine Messwerte vor dem Kontakt: es gilt das t = 0 der Aufzeichnungen",
     r"no stroke is stated: the actuator is taken to halt as it loses contact":
