@@ -4,6 +4,7 @@ import math
 
 from impactcell.measurements.given_values import Given
 from impactcell.measurements.measured_records import Record
+from impactcell.measurements.numbers import number_text
 from impactcell.measurements.recognition import ColumnMeaning
 from impactcell.records import Capture, Channel
 
@@ -36,7 +37,7 @@ def described(
         actuator=channels.get("actuator"),
         direction=int(known.get("direction", 1)),
         stroke_m=given.constants.get("stroke", math.inf),
-        batch_id=None if batch is None else (f"{batch:g}" if isinstance(batch, float) else batch),
+        batch_id=number_text(batch) if isinstance(batch, float) else batch,
         dwell_s=scalar(record, given, ColumnMeaning.DWELL),
         start_m=scalar(record, given, ColumnMeaning.START, known.get("start_m", 0.0)),
         covariates=covariates,

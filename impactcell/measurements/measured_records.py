@@ -11,6 +11,7 @@ from impactcell.campaign import LARGEST
 from impactcell.errors import MeasurementError
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Mapping
+from impactcell.measurements.numbers import number_text
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.sampling_step import sampling_step_s
 from impactcell.measurements.scalars import scalars_of
@@ -121,7 +122,7 @@ def _parts(table: Table, mapping: Mapping, faults: list[str]) -> list[tuple[Tabl
     parts = []
     for key in distinct[np.argsort(first)]:
         rows = np.flatnonzero(keys == key)
-        number = f"{key:g}" if column.text is None else str(key)
+        number = number_text(float(key)) if column.text is None else str(key)
         place = f"{column.name} {number}" if column.text is None else number
         parts.append((table.rows(rows), f"{table.title}: {place}", number))
     return parts

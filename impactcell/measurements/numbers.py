@@ -20,6 +20,10 @@ _SPACES = "\u00a0\u202f\u2009"
 """Spaces that do not break a line: nothing but separators of thousands."""
 
 
+LARGEST_WHOLE = 2.0**53
+"""Whole number beyond which not every one has a double."""
+
+
 @cache
 def _patterns(decimal: str) -> tuple[re.Pattern[str], re.Pattern[str]]:
     mark = re.escape(decimal)
@@ -53,6 +57,17 @@ def parse_number(cell: str, decimal: str = ".") -> float | None:
         digits = "".join(sign for sign in text if sign in "0123456789+-eEdD" or sign == decimal)
         return float(digits.replace(decimal, ".").replace("d", "e").replace("D", "e"))
     return None
+
+
+def number_text(value: float) -> str:
+    """Write a number that names something, as a batch or a shot, so that no other is written alike.
+
+    Examples
+    --------
+    >>> number_text(20240131.0), number_text(0.1), number_text(7.0)
+    ('20240131', '0.1', '7')
+    """
+    return f"{value:.0f}" if value.is_integer() and abs(value) < LARGEST_WHOLE else f"{value:.15g}"
 
 
 def split_stated(text: str, decimal: str) -> tuple[float | None, str]:

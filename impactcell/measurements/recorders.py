@@ -9,6 +9,7 @@ from pathlib import Path
 from impactcell.errors import MeasurementError
 from impactcell.measurements.mapping import Mapping
 from impactcell.measurements.measured_records import Record, later_s, records_by_file
+from impactcell.measurements.numbers import number_text
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.table import Table
 
@@ -151,4 +152,4 @@ def _is_unknown(value: float | str) -> bool:
 
 
 def _shown(value: float | str) -> str:
-    return value if isinstance(value, str) else f"{value:.6g}"
+    return value if isinstance(value, str) else number_text(value)

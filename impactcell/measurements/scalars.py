@@ -8,7 +8,7 @@ import numpy as np
 from impactcell.campaign import COLUMNS, LARGEST
 from impactcell.measurements.assignment import Assignment
 from impactcell.measurements.mapping import Mapping
-from impactcell.measurements.numbers import split_stated
+from impactcell.measurements.numbers import number_text, split_stated
 from impactcell.measurements.recognition import (
     TOKEN_MATCH,
     VOCABULARY,
@@ -116,7 +116,8 @@ def _one_value(column: MeasuredColumn, item: Assignment, place: str, faults: lis
     if item.meaning is ColumnMeaning.VELOCITY:  # as it was measured, not commanded
         return math.nan
     unit = "" if item.unit is None or item.unit.dimension is Dimension.NONE else f" {item.unit.symbol}"
-    faults.append(_changes(column, item, place, f"{low:g}{unit}", f"{high:g}{unit}"))
+    shown = number_text if item.meaning is ColumnMeaning.BATCH else "{:g}".format
+    faults.append(_changes(column, item, place, f"{shown(low)}{unit}", f"{shown(high)}{unit}"))
     return None
 
 
