@@ -11,7 +11,7 @@ from impactcell.campaign import COLUMNS, Campaign, Coordinate, Excitation, Senso
 from impactcell.campaign import write as write_directory
 from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements.alike import check_channels_alike, check_scalars_alike, left_empty
-from impactcell.measurements.captures import channel_of, described
+from impactcell.measurements.captures import channel_of, described, shot_numbers
 from impactcell.measurements.excitation import SWAPPED, excitation_of, looks_swapped
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.given_values import Given
@@ -72,7 +72,8 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
         captures, notes_of_taps = taps_of(records, given)
         notes += notes_of_taps
     else:
-        captures = [_whole(number, record, given) for number, record in enumerate(records, 1)]
+        numbered = zip(shot_numbers(records), records, strict=True)
+        captures = [_whole(number, record, given) for number, record in numbered]
         notes += _of_taps_only(given)
     notes += (of_copies := _of_copies(records))
     is_swapped = looks_swapped(records)

@@ -1,7 +1,10 @@
 """Puts a capture together from the channels of a record and what is constant in it."""
 
 import math
+import re
+from collections.abc import Sequence
 
+from impactcell.campaign.shots import LARGEST_SHOT
 from impactcell.measurements.given_values import Given
 from impactcell.measurements.measured_records import Record
 from impactcell.measurements.numbers import number_text
@@ -20,6 +23,17 @@ def scalar(record: Record, given: Given, meaning: ColumnMeaning, default: float 
     """Value of what is constant in a record: as given for all, else as the record says."""
     value = given.constants.get(str(meaning), record.scalars.get(str(meaning), default))
     return value if isinstance(value, float | int) else default
+
+
+def shot_numbers(records: Sequence[Record]) -> list[int]:
+    """Give the numbers of shots: as the records have them where those can be, else counted from 1.
+
+    A campaign has whole numbers from 1, each once, in whatever order.
+    """
+    said = [int(record.shot) if re.fullmatch("[0-9]{1,16}", record.shot) else 0 for record in records]
+    if len(set(said)) == len(said) and all(0 < number < LARGEST_SHOT for number in said):
+        return said
+    return list(range(1, len(records) + 1))
 
 
 def described(

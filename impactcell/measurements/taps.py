@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from impactcell.campaign import contacts
-from impactcell.measurements.captures import channel_of, described, scalar
+from impactcell.measurements.captures import channel_of, described, scalar, shot_numbers
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.given_values import Given
 from impactcell.measurements.measured_records import Record
@@ -65,10 +65,8 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
             "no position was recorded: such taps tell mu_s by peak force and the model of a cell, and no "
             "model by themselves (--column position=NAME if there is one)"
         )
-    starts = _contact_times(taps, notes)
-    return [
-        _capture(n, tap, t0, given) for n, (tap, t0) in enumerate(zip(taps, starts, strict=True), 1)
-    ], notes
+    numbers, starts = shot_numbers([tap.record for tap in taps]), _contact_times(taps, notes)
+    return [_capture(*one, given) for one in zip(numbers, taps, starts, strict=True)], notes
 
 
 def _signed(records: Sequence[Record], given: Given, notes: list[str]) -> list[Record]:
@@ -80,9 +78,7 @@ def _signed(records: Sequence[Record], given: Given, notes: list[str]) -> list[R
     turned = []
     for record in records:
         force = sign * record.values[ColumnMeaning.FORCE]
-        turned.append(
-            Record(record.place, record.times, {**record.values, ColumnMeaning.FORCE: force}, record.scalars)
-        )
+        turned.append(replace(record, values={**record.values, ColumnMeaning.FORCE: force}))
     return turned
 
 
@@ -128,11 +124,11 @@ def _part(record: Record, onset: int, end_s: float) -> tuple[Record, int]:
     time = record.times[ColumnMeaning.FORCE]
     begin_s = time[onset] - contacts.REST_S
     kept = {q: (t >= begin_s) & (t <= end_s) for q, t in record.times.items()}
-    part = Record(
-        f"{record.place}: tap at {time[onset]:.6g} s",
-        {q: record.times[q][rows] for q, rows in kept.items()},
-        {q: record.values[q][rows] for q, rows in kept.items()},
-        record.scalars,
+    part = replace(
+        record,
+        place=f"{record.place}: tap at {time[onset]:.6g} s",
+        times={q: record.times[q][rows] for q, rows in kept.items()},
+        values={q: record.values[q][rows] for q, rows in kept.items()},
     )
     return part, int(onset - np.count_nonzero(time[:onset] < begin_s))
 

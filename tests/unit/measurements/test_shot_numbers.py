@@ -1,13 +1,16 @@
 """Shots and batches keep the numbers that the files give them."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from impactcell import campaign
 from impactcell.errors import MeasurementError
-from impactcell.measurements import Imported, MeasuredColumn, Table, guess, make_campaign
+from impactcell.measurements import Given, Imported, MeasuredColumn, Table, guess, make_campaign
 from impactcell.measurements.given import read_given
+from tests.unit.measurements.records import sampled, taps
 
 ROWS = 400
 
@@ -59,3 +62,50 @@ def test_what_differs_is_shown_as_differing() -> None:
     one = Table("a.csv", (*driven((1.0,)).columns, MeasuredColumn("batch", None, batches)))
     with pytest.raises(MeasurementError, match=r"\(batch\) is 20240131 and 20240132 within one record"):
         imported(one)
+
+
+def test_shots_keep_the_numbers_of_their_column_and_their_order(tmp_path: Path) -> None:
+    """They became 1, 2, 3: what was said of shot 2 was about the user's 107."""
+    made = imported(driven((105.0, 112.0, 107.0)))
+    campaign.write(made.campaign, tmp_path / "out")
+    back = campaign.read(tmp_path / "out")
+    assert [shot.cycle for shot in back.shots] == [105, 112, 107]
+    assert sorted(trace.stem for trace in (tmp_path / "out" / "traces").iterdir()) == ["105", "107", "112"]
+    apart = imported(driven((9.0, 7.0), channels=("F",)), driven((9.0, 7.0), "b.csv", ("x",)))
+    assert [shot.cycle for shot in apart.campaign.shots] == [9, 7]
+
+
+@pytest.mark.parametrize("numbers", [(0.0, 1.0), (1.5, 2.0), (-1.0, 2.0), (1e16, 2.0)])
+def test_numbers_that_no_shot_can_have_are_counted_anew(numbers: Sequence[float]) -> None:
+    assert [shot.cycle for shot in imported(driven(numbers)).campaign.shots] == [1, 2]
+
+
+def test_numbers_of_several_files_count_where_each_is_there_once() -> None:
+    later, again = driven((3.0, 4.0), "b.csv"), driven((2.0, 4.0), "b.csv")
+    first = driven((1.0, 2.0))
+    assert [shot.cycle for shot in imported(first, later).campaign.shots] == [1, 2, 3, 4]
+    assert [shot.cycle for shot in imported(first, again).campaign.shots] == [1, 2, 3, 4]
+    unnumbered = Table("c.csv", driven((5.0,)).columns[:-1])
+    assert [shot.cycle for shot in imported(later, unnumbered).campaign.shots] == [1, 2, 3]
+
+
+@pytest.mark.parametrize("is_turned", [False, True])
+def test_taps_keep_the_numbers_of_their_column(*, is_turned: bool) -> None:
+    rng = np.random.default_rng(2)
+    parts = [sampled(tap, rng, tail_s=0.3) for tap in taps((3000, 3500), (18.9,))[::2]]
+    numbers = np.repeat([107.0, 105.0], [len(part[0]) for part in parts])
+    time, force, position = (np.concatenate([part[i] for part in parts]) for i in range(3))
+    columns = {"t": ("s", time), "F": ("N", -force if is_turned else force), "x": ("m", position)}
+    of = [MeasuredColumn(name, unit, values) for name, (unit, values) in columns.items()]
+    tables = [Table("a.csv", (*of, MeasuredColumn("shot", None, numbers)))]
+    given = Given(constants={"mass": 18.9, "velocity": 0.05, "stroke": 1.5e-3})
+    made = make_campaign(tables, guess(tables, given))
+    assert [shot.cycle for shot in made.campaign.shots] == [107, 105]
+    # Two taps in each of the numbered records: none has a number of its own.
+    cut = np.repeat([107.0, 105.0], 2 * len(time))
+    step = np.median(np.diff(time))
+    of = [MeasuredColumn(name, unit, np.tile(values, 4)) for name, (unit, values) in columns.items()]
+    of[0] = MeasuredColumn("t", "s", step * np.arange(4 * len(time)))
+    tables = [Table("a.csv", (*of, MeasuredColumn("shot", None, cut)))]
+    made = make_campaign(tables, guess(tables, given))
+    assert [shot.cycle for shot in made.campaign.shots] == list(range(1, 9))
