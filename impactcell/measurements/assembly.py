@@ -11,7 +11,7 @@ from impactcell.campaign import COLUMNS, Campaign, Coordinate, Excitation, Senso
 from impactcell.campaign import write as write_directory
 from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements.alike import check_channels_alike, check_scalars_alike, left_empty
-from impactcell.measurements.captures import channel_of, described, shot_numbers
+from impactcell.measurements.captures import channel_of, described, direction_of, shot_numbers
 from impactcell.measurements.excitation import SWAPPED, excitation_of, looks_swapped
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.given_values import Given
@@ -73,8 +73,8 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
         notes += notes_of_taps
     else:
         numbered = zip(shot_numbers(records), records, strict=True)
-        captures = [_whole(number, record, given) for number, record in numbered]
-        notes += _of_taps_only(given)
+        captures = [_whole(number, record, given, excitation) for number, record in numbered]
+        notes += _of_taps_only(given, excitation)
     notes += (of_copies := _of_copies(records))
     is_swapped = looks_swapped(records)
     notes += [SWAPPED] if is_swapped else []
@@ -137,9 +137,12 @@ def _without_mass(coordinate: Coordinate) -> str:
     return "no mass is stated: it is fitted, and only friction over mass is seen; give --set mass=18.9kg"
 
 
-def _of_taps_only(given: Given) -> list[str]:
-    """Tell what was given and counts for taps alone, where there are none."""
-    names = [name for name in ("velocity", "stroke", "direction") if name in given.constants]
+def _of_taps_only(given: Given, excitation: Excitation) -> list[str]:
+    """Tell what was given and counts for taps alone, where there are none; a slide has a direction too."""
+    of_taps = (
+        ("velocity", "stroke", "direction") if excitation is Excitation.DRIVEN else ("velocity", "stroke")
+    )
+    names = [name for name in of_taps if name in given.constants]
     names += [] if given.trigger is None else ["trigger"]
     if not names:
         return []
@@ -211,10 +214,15 @@ def _way_to_channel(mapping: Mapping) -> str:
     return "name the column, as with --column force=NAME, or say another --excitation"
 
 
-def _whole(number: int, record: Record, given: Given) -> Capture:
-    """Give a record as it is, times counted from its first sample."""
+def _whole(number: int, record: Record, given: Given, excitation: Excitation) -> Capture:
+    """Give a record as it is, times counted from its first sample; what is driven goes either way."""
     first = min(float(time[0]) for time in record.times.values())
-    return described(number, record, given, {str(q): channel_of(record, q, first) for q in CHANNELS})
+    channels = {str(q): channel_of(record, q, first) for q in CHANNELS}
+    position = channels["position"]
+    if excitation is Excitation.DRIVEN or position is None:
+        return described(number, record, given, channels)
+    direction = direction_of(record, given, position, float(position.values[:3].mean()))
+    return described(number, record, given, channels, direction=direction)
 
 
 def _coordinate(mapping: Mapping, excitation: Excitation) -> Coordinate:

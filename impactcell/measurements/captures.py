@@ -11,6 +11,9 @@ from impactcell.measurements.numbers import number_text
 from impactcell.measurements.recognition import ColumnMeaning
 from impactcell.records import Capture, Channel
 
+RESTING = 5
+"""Samples at the end of a position by whose mean is told where the part came to rest."""
+
 
 def channel_of(record: Record, meaning: ColumnMeaning, shift_s: float = 0.0) -> Channel | None:
     """Give a channel of a record with its times counted from `shift_s`, None where it was not recorded."""
@@ -23,6 +26,14 @@ def scalar(record: Record, given: Given, meaning: ColumnMeaning, default: float 
     """Value of what is constant in a record: as given for all, else as the record says."""
     value = given.constants.get(str(meaning), record.scalars.get(str(meaning), default))
     return value if isinstance(value, float | int) else default
+
+
+def direction_of(record: Record, given: Given, position: Channel | None, start_m: float) -> float:
+    """Give +1 or -1: as said, else to which side of `start_m` the part came to rest; else +1."""
+    said = scalar(record, given, ColumnMeaning.DIRECTION)
+    if math.isnan(said) and position is not None:
+        said = float(position.values[-RESTING:].mean()) - start_m
+    return -1.0 if said < 0.0 else 1.0
 
 
 def shot_numbers(records: Sequence[Record]) -> list[int]:

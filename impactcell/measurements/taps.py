@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from impactcell.campaign import contacts
-from impactcell.measurements.captures import channel_of, described, scalar, shot_numbers
+from impactcell.measurements.captures import channel_of, described, direction_of, shot_numbers
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.given_values import Given
 from impactcell.measurements.measured_records import Record
@@ -213,19 +213,16 @@ def _capture(number: int, tap: _TapRecord, t0: float, given: Given) -> Capture:
         channels["force"] = Channel(force.time_s, force.values - offset)
     position = channels["position"]
     start = 0.0
-    direction = scalar(record, given, ColumnMeaning.DIRECTION)
     if position is not None:
         start = _start(position)
         channels["position"] = Channel(position.time_s, position.values - start)
-        if math.isnan(direction):
-            direction = 1.0 if position.values[-5:].mean() >= start else -1.0
     actuator = channels["actuator"]
     if actuator is not None:
         touching = float(np.interp(0.0, actuator.time_s, actuator.values))
         channels["actuator"] = Channel(actuator.time_s, actuator.values - touching)
     return described(
         number, record, given, channels,
-        velocity_m_s=tap.velocity_m_s, start_m=start, direction=-1.0 if direction < 0.0 else 1.0,
+        velocity_m_s=tap.velocity_m_s, start_m=start, direction=direction_of(record, given, position, start),
     )  # fmt: skip
 
 
