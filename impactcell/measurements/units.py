@@ -120,6 +120,11 @@ _RATES = {
 _SUFFIX_WORDS = {"n": "N", "nm": "nm", "v": "V", "a": "A", "k": "K", "hz": "Hz", "kn": "kN", "pa": "Pa"}
 """Units of a name in lower case, as in `force_n`, that lower case would hide."""
 
+_SEPARATORS = (" ?/ ?", " in ", ", ", " ", "_")
+"""What stands between a name and its unit, in the order in which they are believed."""
+_ONE_WORD = re.compile("(?!1 ?/ ?s|1 / )[^ /]+(?: ?/ ?[^ /]+)?")
+"""A unit that may stand behind a name without anything between them."""
+
 
 @cache
 def _symbols() -> dict[str, MeasuredUnit]:
@@ -188,6 +193,11 @@ def split_unit(header: str) -> tuple[str, str | None]:
     --------
     >>> split_unit("Kraft in kN"), split_unit("velocity_mm_per_min"), split_unit("Force")
     (('Kraft', 'kN'), ('velocity', 'mm/min'), ('Force', None))
+
+    Of several slashes the first that leaves a unit separates, as DIN 461 has it:
+
+    >>> split_unit("v / mm/min"), split_unit("dx/dt / mm/s")
+    (('v', 'mm/min'), ('dx/dt', 'mm/s'))
     """
     text = " ".join(header.split())
     bracket = re.fullmatch(r"(.*\S)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\})", text)
@@ -196,14 +206,32 @@ def split_unit(header: str) -> tuple[str, str | None]:
         unit = next(part for part in units if part is not None).strip()
         if parse_unit(unit) or bracket.group(2) is not None:
             return name, unit or None
-    for pattern in (r"(.*\S)\s*/\s*(\S+(?: \S+)?)", r"(.*\S) in (\S+(?: \S+)?)", r"(.*\S),\s+(\S+)"):
-        match = re.fullmatch(pattern, text)
-        if match and parse_unit(match.group(2)):
-            return match.group(1), match.group(2)
-    match = re.fullmatch(r"(.*[^\s_])\s(\S+)", text)
-    if match and len(match.group(2)) > 1 and parse_unit(match.group(2)):
-        return match.group(1), match.group(2)
+    if "/" in text and " " not in text and parse_unit(text):
+        return text, text  # a unit alone, and no `m` in seconds
+    found = [
+        (text[: match.start()], text[match.end() :])
+        for separator in _SEPARATORS
+        for match in re.finditer(separator, text)
+        if _parts_unit(text, match)
+    ]
+    if found:
+        return max(found, key=lambda parts: len(parts[1]))
     return _suffix(text)
+
+
+def _parts_unit(text: str, separator: re.Match[str]) -> bool:
+    """Whether a unit stands behind a separator, and a name before it."""
+    name, unit = text[: separator.start()], text[separator.end() :]
+    if not name or not parse_unit(unit):
+        return False
+    match separator[0]:
+        case " ":
+            # Of one sign is rather a name, and so is a number: in `Zeit 1 / s` the slash separates.
+            return len(unit) > 1 and not name.endswith("_") and bool(_ONE_WORD.fullmatch(unit))
+        case "_":
+            return len(unit.partition("/")[0]) > 1 and "/" in unit  # v_m/s is rather v_m in seconds
+        case _:
+            return True
 
 
 def _suffix(text: str) -> tuple[str, str | None]:

@@ -1,0 +1,91 @@
+"""Names of columns with their units, as people write them in a header."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from impactcell.measurements import ColumnMeaning, guess, make_campaign, read_tables
+from impactcell.measurements.given import read_given
+from impactcell.measurements.units import parse_unit, split_unit
+from tests.unit.measurements.records import sampled, taps
+
+NAMES = (
+    "F",
+    "v",
+    "Kraft",
+    "Weg x",
+    "p1",
+    "dx/dt",
+    "Ein/Aus",
+    "x (links)",
+    "Weg/Zeit-Kurve",
+    "Größe_2",
+    "T-Öl",
+)
+UNITS = (
+    "s", "ms", "min", "h", "m", "mm", "µm", "in", "N", "kN", "lbf", "N m", "kg", "kg m²", "kg·m²", "bar", "V",
+    "mA", "m/s", "mm/s", "mm/min", "m/min", "mm / min", "in/s", "m/s²", "m / s²", "rad/s", "deg/s", "U/min",
+    "1/min", "1/s", "rpm", "°", "°C", "%", "Hz",
+)  # fmt: skip
+WRITINGS = ("{} / {}", "{} /{}", "{}/{}", "{} [{}]", "{} ({})", "{} in {}", "{}, {}")
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("writing", WRITINGS)
+def test_a_name_and_its_unit_come_apart_in_every_writing(name: str, writing: str) -> None:
+    for unit in UNITS:
+        assert parse_unit(unit) is not None, unit
+        assert split_unit(writing.format(name, unit)) == (name, unit)
+
+
+@pytest.mark.parametrize(
+    ("header", "parts"),
+    [
+        ("Weg mm", ("Weg", "mm")),
+        ("Zeit ms", ("Zeit", "ms")),
+        ("Zeit s", ("Zeit s", None)),
+        ("v mm/min", ("v", "mm/min")),
+        ("Speed m/s", ("Speed", "m/s")),
+        ("Drehzahl 1/min", ("Drehzahl", "1/min")),
+        ("Zeit 1 / s", ("Zeit 1", "s")),
+        ("Zeit 1/s", ("Zeit 1", "s")),
+        ("Kanal 1 / min", ("Kanal 1", "min")),
+        ("Weg s / mm", ("Weg s", "mm")),
+        ("Geschwindigkeit v / mm/s", ("Geschwindigkeit v", "mm/s")),
+        ("t/s", ("t", "s")),
+        ("s/mm", ("s", "mm")),
+        ("F/N", ("F", "N")),
+        ("m/kg", ("m", "kg")),
+        ("t/min", ("t", "min")),
+        ("m/s", ("m/s", "m/s")),
+        ("1/min", ("1/min", "1/min")),
+        ("v_m/s", ("v_m", "s")),
+        ("velocity_mm/s", ("velocity", "mm/s")),
+        ("position_mm", ("position", "mm")),
+        ("velocity_mm_per_min", ("velocity", "mm/min")),
+        ("Ch 1/2", ("Ch 1/2", None)),
+        ("Ch 1/2 / V", ("Ch 1/2", "V")),
+        ("A/B", ("A/B", None)),
+        ("Kraft (oben)", ("Kraft (oben)", None)),
+        ("Weg/Zeit", ("Weg/Zeit", None)),
+        ("Force", ("Force", None)),
+    ],
+)
+def test_headers_that_may_be_read_in_two_ways(header: str, parts: tuple[str, str | None]) -> None:
+    assert split_unit(header) == parts
+
+
+def test_a_column_in_the_notation_of_din_says_the_velocity(tmp_path: Path) -> None:
+    """`v / mm/min` was a column `v / mm` of minutes, and the velocity was not known."""
+    tap, rng = taps((3000,), (18.9,))[0], np.random.default_rng(3)
+    rows = [f"{t:.5f};{f:.5f};{1e3 * x:.6f};3000" for t, f, x in zip(*sampled(tap, rng), strict=True)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["t / s;F / N;x / mm;v / mm/min", *rows]), encoding="utf-8")
+    tables = read_tables(path)
+    mapping = guess(tables, read_given({"constants": ["mass=18.9kg", "stroke=1.5mm"]}))
+    velocity = mapping.of(ColumnMeaning.VELOCITY)
+    assert velocity is not None
+    assert velocity.column == "v"
+    (shot,) = make_campaign(tables, mapping).campaign.shots
+    assert shot.velocity_m_s == pytest.approx(0.05)
