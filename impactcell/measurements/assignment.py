@@ -17,7 +17,7 @@ from impactcell.measurements.recognition import (
     ColumnMeaning,
     name_score,
 )
-from impactcell.measurements.sampling_step import sampling_step_s
+from impactcell.measurements.sampling_step import doubt_of_step, sampling_step_s
 from impactcell.measurements.table import Table
 from impactcell.measurements.units import Dimension, MeasuredUnit
 from impactcell.records import Samples
@@ -162,7 +162,10 @@ def _contradictions(assignments: Sequence[Assignment]) -> list[str]:
 
 
 def _no_time(tables: Sequence[Table], unused: AbstractSet[str]) -> str:
-    """Say why a column that is called as the time is none, or which `unused` one goes up as a time does."""
+    """Say why what seems to tell the time does not, or which `unused` one goes up as a time does."""
+    for table in tables:
+        if doubt := doubt_of_step(table):
+            return f": {doubt}"
     for table in tables:
         for column in table.columns:
             if name_score(column.name, ColumnMeaning.TIME)[0] < WORD_MATCH:

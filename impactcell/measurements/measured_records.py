@@ -13,7 +13,7 @@ from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.mapping import Mapping
 from impactcell.measurements.numbers import number_text
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
-from impactcell.measurements.sampling_step import sampling_step_s
+from impactcell.measurements.sampling_step import doubt_of_step, sampling_step_s
 from impactcell.measurements.scalars import scalars_of
 from impactcell.measurements.table import Table
 from impactcell.records import Samples
@@ -171,8 +171,9 @@ def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:
     if item is None or column is None:
         step = sampling_step_s(table, mapping.given.constants)
         if step is None:
+            why = f": {doubt}" if (doubt := doubt_of_step(table)) else ""
             faults.append(
-                f"{table.title}: has no column of time; name it, or give the rate with --set rate=10kHz"
+                f"{table.title}: has no column of time{why}; name it, or give the rate with --set rate=10kHz"
             )
             return None
         return np.asarray(step * np.arange(len(table)), dtype=np.float64)

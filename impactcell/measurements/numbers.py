@@ -20,6 +20,10 @@ _SPACES = "\u00a0\u202f\u2009"
 """Spaces that do not break a line: nothing but separators of thousands."""
 
 
+_STATED = re.compile(r"([+-]?[0-9.,'’]+(?:[eE][+-]?[0-9]+)?)\s*(.*)")
+"""A number, and whatever follows it."""
+_ONE_SEPARATOR = re.compile(r"([+-]?[1-9][0-9]{0,2})([.,])([0-9]{3})((?:[eE][+-]?[0-9]+)?)")
+"""A number whose one separator may be of thousands or of decimals."""
 LARGEST_WHOLE = 2.0**53
 """Whole number beyond which not every one has a double."""
 
@@ -80,13 +84,32 @@ def split_stated(text: str, decimal: str) -> tuple[float | None, str]:
     >>> split_stated("3.000 mm/min", ","), split_stated("18.9kg", ","), split_stated("0.050 m/s", ",")
     ((3000.0, 'mm/min'), (18.9, 'kg'), (0.05, 'm/s'))
     """
-    match = re.fullmatch(r"([+-]?[0-9.,'’]+(?:[eE][+-]?[0-9]+)?)\s*(.*)", text.strip().replace("−", "-"))
+    match = _STATED.fullmatch(text.strip().replace("−", "-"))
     if match is None:
         return None, text
     value = parse_number(match[1], decimal)
     if value is None:
         value = parse_number(match[1], "," if decimal == "." else ".")
     return value, match[2]
+
+
+def doubt_of_line(key: str, text: str, decimal: str) -> str:
+    """Say what a line may say where one separator may be of thousands or of decimals; empty where none may.
+
+    Who writes a line need not write numbers as whoever writes the table.
+
+    Examples
+    --------
+    >>> doubt_of_line("Masse", "12.600 kg", ","), doubt_of_line("Masse", "12,600 kg", ",")
+    ("the line 'Masse: 12.600 kg' may say 12,6 or 12600", '')
+    """
+    match = _STATED.fullmatch(text.strip().replace("−", "-"))
+    parts = _ONE_SEPARATOR.fullmatch(match[1]) if match else None
+    if parts is None or parts[2] == decimal:
+        return ""
+    whole, _, fraction, power = parts.groups()
+    small = f"{whole}{decimal}{fraction}".rstrip("0").rstrip(decimal)
+    return f"the line {f'{key}: {text}'!r} may say {small}{power} or {whole}{fraction}{power}"
 
 
 def is_grouped(cell: str, decimal: str) -> bool:

@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Mapping
 
-from impactcell.measurements.numbers import split_stated
+from impactcell.measurements.numbers import doubt_of_line, split_stated
 from impactcell.measurements.recognition import RATE_WORDS, STEP_WORDS, normalised
 from impactcell.measurements.table import Table
 from impactcell.measurements.units import Dimension, parse_unit, split_unit
@@ -21,9 +21,17 @@ def sampling_step_s(table: Table, constants: Mapping[str, float]) -> float | Non
         return 1.0 / constants["rate_hz"]
     for key, text in table.attributes.items():
         step = _step(key, text, table.decimal)
-        if step is not None and 0.0 < step < math.inf:
+        if step is not None and 0.0 < step < math.inf and not doubt_of_line(key, text, table.decimal):
             return step
     return None
+
+
+def doubt_of_step(table: Table) -> str:
+    """Say which line of a table says its step in a way that may be read as another; empty where none does."""
+    for key, text in table.attributes.items():
+        if _step(key, text, table.decimal) is not None and (doubt := doubt_of_line(key, text, table.decimal)):
+            return doubt
+    return ""
 
 
 def _step(key: str, text: str, decimal: str) -> float | None:

@@ -8,7 +8,7 @@ import numpy as np
 from impactcell.campaign import COLUMNS, LARGEST
 from impactcell.measurements.assignment import Assignment
 from impactcell.measurements.mapping import Mapping
-from impactcell.measurements.numbers import number_text, split_stated
+from impactcell.measurements.numbers import doubt_of_line, number_text, split_stated
 from impactcell.measurements.recognition import (
     TOKEN_MATCH,
     VOCABULARY,
@@ -52,10 +52,13 @@ def scalars_of(table: Table, place: str, mapping: Mapping, faults: list[str]) ->
     """
     given = mapping.given.constants
     scalars: dict[str, float | str] = {}
-    for meaning, (value, *others) in _all_beside(table).items():
+    for meaning, ((value, *others), doubt) in _all_beside(table).items():
         if str(meaning) in given:
             continue
-        if others and meaning in EXAMPLES:
+        if doubt:
+            way = f", or {_way_out(meaning)}" if meaning in EXAMPLES else ""
+            faults.append(f"{place}: {doubt}; write it so{way}")
+        elif others and meaning in EXAMPLES:
             unit = VOCABULARY[meaning].dimensions[0].value
             faults.append(
                 f"{place}: the lines beside the columns say {meaning} {value:g} {unit} and {others[0]:g} "
@@ -177,26 +180,29 @@ def covariate_name(column: str, dimension: Dimension | None) -> str:
 
 def said_beside(table: Table) -> dict[ColumnMeaning, float | str]:
     """Quantities of which the file says one value beside its columns, as `Masse: 18,9 kg`."""
-    return {meaning: values[0] for meaning, values in _all_beside(table).items() if len(values) == 1}
+    return {meaning: values[0] for meaning, (values, _) in _all_beside(table).items() if len(values) == 1}
 
 
-def _all_beside(table: Table) -> dict[ColumnMeaning, list[float | str]]:
+def _all_beside(table: Table) -> dict[ColumnMeaning, tuple[list[float | str], str]]:
     """Every value that the lines beside the columns say of a quantity by the name that fits it best.
 
-    `Masse` goes before `Masse Greifer`.
+    `Masse` goes before `Masse Greifer`. Beside them what one of these lines may say otherwise.
     """
     said: dict[ColumnMeaning, list[float | str]] = {}
     scores: dict[ColumnMeaning, float] = {}
+    doubts: dict[ColumnMeaning, str] = {}
     for key, text in table.attributes.items():
         found = _quantity_beside(key, text, table.decimal)
         if found is None or found[1] < scores.get(found[0], -1.0):
             continue
         meaning, score, value = found
         if score > scores.get(meaning, -1.0):
-            said[meaning], scores[meaning] = [], score
+            said[meaning], scores[meaning], doubts[meaning] = [], score, ""
         if value not in said[meaning]:
             said[meaning].append(value)
-    return said
+        if isinstance(value, float):
+            doubts[meaning] = doubts[meaning] or doubt_of_line(key, text, table.decimal)
+    return {meaning: (values, doubts[meaning]) for meaning, values in said.items()}
 
 
 def _quantity_beside(key: str, text: str, decimal: str) -> tuple[ColumnMeaning, float, float | str] | None:

@@ -17,9 +17,15 @@ FAULTS: Final = (
         "keine Zeitspalte gefunden{why}; unten im Formular wählen, oder dort die Abtastrate angeben",
     ),
     FaultPattern(
-        r"has no column of time; name it, .*",
-        "has no column of time; choose it in the form below, or give the sampling rate there",
-        "hat keine Zeitspalte; unten im Formular wählen, oder dort die Abtastrate angeben",
+        r"has no column of time(?P<why>.*); name it, .*",
+        "has no column of time{why}; choose it in the form below, or give the sampling rate there",
+        "hat keine Zeitspalte{why}; unten im Formular wählen, oder dort die Abtastrate angeben",
+    ),
+    FaultPattern(
+        r"the line (['\"])(?P<line>.+)\2 may say (?P<one>\S+) or (?P<other>\S+); write it so.*",
+        "the line “{line}” may say {one} or {other}; write it so, or give it for all shots in the form below",
+        "die Zeile „{line}“ kann {one} oder {other} heißen; so schreiben oder unten im Formular für alle "
+        "Stöße angeben",
     ),
     FaultPattern(
         r"channel (['\"])(?P<column>.+)\2 of group (['\"])(?P<group>.+)\4 does not say at which moment .*",
@@ -209,6 +215,8 @@ DATES: Final = {
 }  # fmt: skip
 """What keeps dates from being a time, and what to do."""
 REASONS: Final = (
+    (r": the line (['\"])(?P<line>.+)\1 may say (?P<one>\S+) or (?P<other>\S+)",
+     ": die Zeile „{line}“ kann {one} oder {other} heißen"),
     (r": '(?P<column>.+)' holds dates of which [a-z ]+, as '(?P<text>.*)'",
      ": in „{column}“ können Tag und Monat vertauscht sein, etwa „{text}“"),
     (r": '(?P<column>.+)' holds days without a time of day, as '(?P<text>.*)'",
