@@ -9,7 +9,7 @@ from impactcell.errors import MeasurementError
 from impactcell.measurements.assignment import Assignment
 from impactcell.measurements.column_units import unit_of
 from impactcell.measurements.gains import Gain
-from impactcell.measurements.recognition import ColumnMeaning
+from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.table import MeasuredColumn, Table
 from impactcell.measurements.units import parse_unit
 
@@ -61,7 +61,9 @@ def without_use(assignments: Sequence[Assignment], given: Given, tables: Sequenc
         if meaning not in columns
     ]
     times = [item.column for item in assignments if item.meaning is ColumnMeaning.TIME]
-    timed = all(any(table.column(name) for name in times) for table in tables)
+    channels = {item.column for item in assignments if item.meaning in CHANNELS}
+    measured = [table for table in tables if any(column.name in channels for column in table.columns)]
+    timed = all(any(table.column(name) for name in times) for table in measured or tables)
     if times and "rate_hz" in given.constants and timed:
         time = times[0]
         faults.append(

@@ -61,7 +61,7 @@ def _read_group(
                 cells = _read_group(h5py, item, path, limits, (depth + 1, cells), tables)
             continue
         cells = _count(item, path, limits, cells)
-        columns += _columns(name, item, path, told)
+        columns += _columns(h5py, name, item, path, told)
     limits.check_shape(f"{path}: {group.name}", 0, len(columns))
     attributes = {key: _plain(value) for key, value in group.attrs.items()}
     note = "HDF5" if group.name == "/" else f"HDF5 group {group.name}"
@@ -79,10 +79,23 @@ def _count(item: Any, path: Path, limits: Limits, cells: int) -> int:
     )
 
 
-def _columns(name: str, item: Any, path: Path, told: list[str]) -> list[tuple[str, str | None, Any]]:
+def _is_plain(h5py: Any, item: Any) -> bool:
+    """Whether a data set holds numbers or text: no references, as of MATLAB's cells, nor lists in its cells.
+
+    What MATLAB marks as empty holds a shape.
+    """
+    is_text = h5py.check_string_dtype(item.dtype) is not None
+    return (is_text or not item.dtype.hasobject) and "MATLAB_empty" not in item.attrs
+
+
+def _columns(
+    h5py: Any, name: str, item: Any, path: Path, told: list[str]
+) -> list[tuple[str, str | None, Any]]:
     unit = next((str(_plain(item.attrs[key])) for key in UNIT_KEYS if key in item.attrs), None)
-    if not item.size or item.ndim not in (1, 2) or (item.dtype.hasobject and item.dtype.kind != "O"):
+    if not item.size or item.ndim not in (1, 2) or not _is_plain(h5py, item):
         return []
+    if _plain(item.attrs.get("MATLAB_class")) == "char" and item.ndim == 2:
+        return [(name, unit, ["".join(map(chr, word)).strip() for word in item[()].T.tolist()])]
     if item.dtype.names:
         records = item[()]
         return [(field, unit, records[field]) for field in item.dtype.names if records[field].ndim == 1]

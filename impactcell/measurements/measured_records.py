@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping as AbstractMapping
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -10,12 +11,13 @@ from scipy.integrate import cumulative_trapezoid
 from impactcell.campaign import LARGEST
 from impactcell.errors import MeasurementError
 from impactcell.measurements.faults import raise_faults
+from impactcell.measurements.groups import places_beside
 from impactcell.measurements.mapping import Mapping
 from impactcell.measurements.numbers import number_text
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.sampling_step import doubt_of_step, sampling_step_s
 from impactcell.measurements.scalars import scalars_of
-from impactcell.measurements.table import Table
+from impactcell.measurements.table import MeasuredColumn, Table
 from impactcell.records import Samples
 
 
@@ -49,6 +51,7 @@ def records_by_file(tables: Sequence[Table], mapping: Mapping) -> dict[str, list
     """Give the records of each file: one a shot where there is a column of shots, else one a table.
 
     Tables of one file whose channels differ belong to one record; those with the same channels are several.
+    A table without any beside them needs no time: it says what is constant in those of its group.
 
     Raises
     ------
@@ -59,8 +62,14 @@ def records_by_file(tables: Sequence[Table], mapping: Mapping) -> dict[str, list
     faults = _contrary_clocks(tables, mapping)
     raise_faults(faults)
     by_file: dict[str, list[Record]] = {}
+    groups: dict[str, list[str]] = {}
+    measured = {table.source for table in tables if _has_channel(table, mapping)}
+    beside: dict[Table, int] = {}
     for table in tables:
-        records = by_file.setdefault(table.source, [])
+        records, of = by_file.setdefault(table.source, []), groups.setdefault(table.source, [])
+        if table.source in measured and not _has_channel(table, mapping):
+            beside[table] = max(len(records) - 1, 0)
+            continue
         for part, place, shot in _parts(table, mapping, faults):
             record = _record(part, place, shot, mapping, faults)
             if record is None:
@@ -69,6 +78,9 @@ def records_by_file(tables: Sequence[Table], mapping: Mapping) -> dict[str, list
                 records[-1] = _together(records[-1], record)
             else:
                 records.append(record)
+                of.append(table.name)
+    for table, places in places_beside(beside, groups, mapping).items():
+        by_file[table.source] = _with_beside(by_file[table.source], places, table, mapping, faults)
     raise_faults(faults)
     by_file = {file: [record for record in records if record.values] for file, records in by_file.items()}
     if not any(by_file.values()):
@@ -76,12 +88,30 @@ def records_by_file(tables: Sequence[Table], mapping: Mapping) -> dict[str, list
     return by_file
 
 
+def _has_channel(table: Table, mapping: Mapping) -> bool:
+    return any(item.meaning in CHANNELS and table.column(item.column) for item in mapping.assignments)
+
+
+def _with_beside(
+    records: Sequence[Record], places: AbstractSet[int], table: Table, mapping: Mapping, faults: list[str]
+) -> list[Record]:
+    """Give the records with what is constant in a table without a channel, by their shots if numbered."""
+    numbered = any(record.shot for place, record in enumerate(records) if place in places)
+    parts = _parts(table, mapping, faults) if numbered else [(table, table.title, "")]
+    said = {shot: scalars_of(part, where, mapping, faults) for part, where, shot in parts}
+    return [
+        replace(record, scalars={**said.get("", {}), **said.get(record.shot, {}), **record.scalars})
+        if place in places
+        else record
+        for place, record in enumerate(records)
+    ]
+
+
 def _contrary_clocks(tables: Sequence[Table], mapping: Mapping) -> list[str]:
     """Tell tables that a given rate would count for beside one of the same file with times of its own."""
     if "rate_hz" not in mapping.given.constants:
         return []
-    channels = {item.column for item in mapping.assignments if item.meaning in CHANNELS}
-    measured = [table for table in tables if any(column.name in channels for column in table.columns)]
+    measured = [table for table in tables if _has_channel(table, mapping)]
     timed = {
         table.source: (table, item.column)
         for table in measured
@@ -99,10 +129,14 @@ def _contrary_clocks(tables: Sequence[Table], mapping: Mapping) -> list[str]:
     return faults
 
 
+def _shot_column(table: Table, mapping: Mapping) -> MeasuredColumn | None:
+    shot = mapping.of(ColumnMeaning.SHOT)
+    return None if shot is None else table.column(shot.column)
+
+
 def _parts(table: Table, mapping: Mapping, faults: list[str]) -> list[tuple[Table, str, str]]:
     """Rows of each shot, where they are found and its number, in order of appearance."""
-    shot = mapping.of(ColumnMeaning.SHOT)
-    column = None if shot is None else table.column(shot.column)
+    column = _shot_column(table, mapping)
     if column is None:
         return [(table, table.title, "")]
     keys = np.array(column.text) if column.text is not None else column.values
@@ -111,7 +145,7 @@ def _parts(table: Table, mapping: Mapping, faults: list[str]) -> list[tuple[Tabl
         faults.append(f"{table.place(row)}: column {column.name!r} is empty; every row needs its shot")
         return []
     distinct, first = np.unique(keys, return_index=True)
-    if len(distinct) > max(0.2 * len(keys), 1) and len(keys) > 50:
+    if len(distinct) > max(0.2 * len(keys), 1) and len(keys) > 50 and _has_channel(table, mapping):
         faults.append(
             f"{table.title}: column {column.name!r} has {len(distinct)} values in {len(keys)} rows, so it "
             f"does not "
