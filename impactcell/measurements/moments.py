@@ -17,7 +17,9 @@ EPOCH = np.datetime64("1970-01-01", "ns")
 _CLOCK = (
     r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2}(?:[.,;]\d+)?))?(?:\s*(?P<half>[AaPp])[Mm])?"
 )
-_BEFORE_CLOCK, _ZONE = r",?[T ]+", r"(?:Z|[+-]\d{2}:?\d{2})?"
+_BEFORE_CLOCK = r",?[T ]+"
+_ZONE = r"(?:Z|(?P<ahead>[+-])(?P<zone_hour>\d{2}):?(?P<zone_minute>\d{2}))?"
+"""How far a clock is ahead of UTC: what is written without is not known, and taken as it is."""
 _TWO = r"(\d{1,2})"
 _DATES = (
     (r"(?P<date>(\d{4})(?P<mark>[-/.])" + _TWO + r"(?P=mark)" + _TWO + ")", ("ymd",)),
@@ -37,7 +39,7 @@ class Moments:
     seconds : ndarray, shape (n,)
         From the first.
     begun : datetime64
-        The first; of 1 January 1970 where no day is written.
+        The first, by UTC where cells say their zone; of 1 January 1970 where no day is written.
     """
 
     seconds: Samples
@@ -48,9 +50,15 @@ def read_moments(cells: Sequence[str]) -> Moments | None:
     """Give the moments of a column of dates or clock times; None where it is none.
 
     A date with dots begins with its day. One with strokes is read where one order alone fits all cells, as a
-    day above 12 has it, or where all orders say the same, as within one day.
+    day above 12 has it, or where all orders say the same, as within one day. What cells say of their zone
+    counts, as where clocks are put forward; a clock without a date that falls by half a day goes over
+    midnight.
 
     >>> read_moments(["31/01/2024 23:59:59", "01/02/2024 00:00:01"]).seconds
+    array([0., 2.])
+    >>> read_moments(["2024-03-31T01:59:59+01:00", "2024-03-31T03:00:00+02:00"]).seconds
+    array([0., 1.])
+    >>> read_moments(["23:59:59", "00:00:01"]).seconds
     array([0., 2.])
     >>> read_moments(["05/01/2024 23:59:59", "06/01/2024 00:00:01"]) is None
     True
@@ -79,12 +87,13 @@ def _readings(cells: Sequence[str]) -> list[Moments]:
     clock = _matches(_CLOCK, cells)
     if clock:
         seconds = np.array([_second_of_day(match) for match in clock])
+        seconds[1:] += DAY_S * np.cumsum(np.diff(seconds) < -0.5 * DAY_S)
         return [_moments(0.0, seconds)]
     for pattern, orders in _DATES:
         matches = _matches(pattern + _BEFORE_CLOCK + _CLOCK + _ZONE, cells)
         if not matches:
             continue
-        seconds = np.array([_second_of_day(match) for match in matches])
+        seconds = np.array([_second_of_day(match) - _ahead_s(match) for match in matches])
         readings: list[Moments] = []
         for order in orders:
             days = {text: _ordinal(order, text) for text in {match["date"] for match in matches}}
@@ -133,3 +142,11 @@ def _second_of_day(match: re.Match[str]) -> float:
     if match["half"] is not None:
         hour = hour % 12 + (12 if match["half"] in "Pp" else 0)
     return 3600.0 * hour + 60.0 * int(match["minute"]) + float(re.sub("[,;]", ".", match["second"] or "0"))
+
+
+def _ahead_s(match: re.Match[str]) -> float:
+    """How far the clock of a cell is ahead of UTC [s]; 0 where it does not say."""
+    if match["ahead"] is None:
+        return 0.0
+    ahead = 3600.0 * int(match["zone_hour"]) + 60.0 * int(match["zone_minute"])
+    return -ahead if match["ahead"] == "-" else ahead

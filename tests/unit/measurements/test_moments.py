@@ -34,12 +34,38 @@ def column_of_time(directory: Path, cells: list[str], name: str = "time") -> Pat
         ("05/01/2024 10:00:00", "05/01/2024 10:00:01"),
         ("05/01/24 10:00:00", "05/01/24 10:00:01"),
         ("11:59:59.5", "12:00:00.5"),
+        ("2024-03-31T01:59:59.5+01:00", "2024-03-31T03:00:00.5+02:00"),
+        ("2024-10-27T02:59:59.5+0200", "2024-10-27T02:00:00.5+0100"),
+        ("2024-01-05T23:59:59.5-05:30", "2024-01-06T05:30:00.5Z"),
+        ("05.01.2024 23:59:59,5+02:00", "05.01.2024 22:00:00,5Z"),
+        ("01/05/2024 00:30:00.5+02:00", "30/04/2024 22:30:01.5Z"),
+        ("23:59:59.5", "00:00:00.5"),
     ],
 )
 def test_dates_that_say_one_thing_are_seconds_from_the_first(first: str, second: str) -> None:
     moments = read_moments([first, second])
     assert moments is not None
     np.testing.assert_allclose(moments.seconds, [0.0, 1.0], atol=1e-9)
+
+
+def test_a_moment_is_the_same_in_every_zone() -> None:
+    """Two recorders of which one says UTC and the other its own time were two hours apart."""
+    said = (
+        "2024-07-01T10:00:00Z",
+        "2024-07-01 12:00:00+02:00",
+        "01.07.2024 06:30:00-03:30",
+        "2024-07-01 10:00:00",
+    )
+    begun = {moments.begun for cell in said if (moments := read_moments([cell])) is not None}
+    assert begun == {np.datetime64("2024-07-01T10:00:00")}
+
+
+def test_a_clock_goes_over_every_midnight_and_back_by_less_than_half_a_day() -> None:
+    cells = ["18:00:00", "23:00:00", "04:00:00", "03:00:00", "15:00:00", "02:00:00"]
+    moments = read_moments(cells)
+    assert moments is not None
+    np.testing.assert_array_equal(moments.seconds / 3600.0, [0.0, 5.0, 10.0, 9.0, 21.0, 32.0])
+    assert moments.begun == np.datetime64("1970-01-01T18:00:00")
 
 
 def test_one_day_above_twelve_tells_the_order_of_all() -> None:

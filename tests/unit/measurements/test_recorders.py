@@ -119,6 +119,17 @@ def test_moments_set_the_times_of_two_recorders(tmp_path: Path, begun: str, late
     assert f"nach den Zeitpunkten darin, {later_s:g} s auseinander".replace(".", ",") in german
 
 
+def test_recorders_in_two_time_zones_are_set_by_the_moment(tmp_path: Path) -> None:
+    force, _ = loggers(tmp_path, later_s=0.25, begun="2026-11-28T{}+01:00")
+    kept = [file.read_bytes() for file in force]
+    _, position = loggers(tmp_path, later_s=0.25, begun="2026-11-28T{}Z")
+    for file, content in zip(force, kept, strict=True):
+        file.write_bytes(content)
+    for file in position:
+        file.write_text(file.read_text(encoding="utf-8").replace("T10:", "T09:"), encoding="utf-8")
+    check(imported([*force, *position], **DRIVEN), later_s=0.25)
+
+
 def test_a_recorder_that_began_before_the_other_is_moved_back(tmp_path: Path) -> None:
     force, position = loggers(tmp_path, later_s=0.25, begun="2026-11-28 {}")
     check(imported([*position, *force], **DRIVEN), later_s=0.25)
