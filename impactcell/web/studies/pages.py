@@ -11,8 +11,9 @@ from impactcell.german.findings import REPORTS
 from impactcell.scada import RefusedError, Role
 from impactcell.web.messages import Messages
 from impactcell.web.page_context import PageContext
-from impactcell.web.requests import RequestRefusedError
+from impactcell.web.requests import CSRF_FIELD, RequestRefusedError
 from impactcell.web.sessions import BrowserSession
+from impactcell.web.studies.queue import is_choice
 from impactcell.web.studies.study import Acceptance, Goal, Stage, Study
 from impactcell.web.studies.upload import KINDS, MAX_FILES, receive, safe_name
 
@@ -86,13 +87,13 @@ async def read(context: PageContext, request: Request, _: BrowserSession, form: 
     study = _study(context, request)
     if study.is_working or not study.files:
         raise RequestRefusedError(409, "error_study_stage")
+    fields = {name: value.strip() for name, value in form.items() if name != CSRF_FIELD}
+    if not all(is_choice(name, value) for name, value in fields.items()):
+        raise RequestRefusedError(400, "error_form")
     messages = Messages(context.language(request))
     chosen = {
-        name: messages.understood(value.strip())
-        if name.startswith("set.") or name == "trigger"
-        else value.strip()
-        for name, value in form.items()
-        if name != "csrf"
+        name: messages.understood(value) if name.startswith("set.") or name == "trigger" else value
+        for name, value in fields.items()
     }
     if chosen:  # nothing is chosen yet where it is read for the first time
         study.choices = {name: value for name, value in chosen.items() if value}

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import logging
+import re
 import shutil
 from collections import deque
 from collections.abc import Awaitable, Callable, Mapping, Sequence
@@ -23,6 +24,8 @@ STUDY_S: Final = 3600.0
 """Longest time of a study."""
 MAX_FAULTS: Final = 40
 """Faults that are shown."""
+_CHOICE: Final = re.compile(r"(?:column|unit|set)\..+|trigger", re.DOTALL)
+"""Names of the fields with which a form says how files are to be read."""
 
 RunVerb = Callable[[Sequence[str], float, Callable[[str], None] | None], Awaitable[VerbOutcome]]
 
@@ -177,16 +180,29 @@ class StudyQueue:
         return outcome
 
 
-def import_options(choices: Mapping[str, str]) -> list[str]:
-    """Give the options of `impactcell import` for what was chosen on the form.
+def is_choice(field: str, value: str) -> bool:
+    """Say whether a field of a form says how files are to be read: no other becomes an option.
 
-    A field is named `column.QUANTITY`, `unit.COLUMN`, `set.NAME`, or as an option itself.
+    >>> is_choice("column.force", "F1"), is_choice("output", "/etc"), is_choice("column", "F1")
+    (True, False, False)
+    """
+    return _CHOICE.fullmatch(field) is not None and "\0" not in field + value
+
+
+def import_options(choices: Mapping[str, str]) -> list[str]:
+    """Give the options of `impactcell import` for what was chosen on the form, one argument each.
+
+    A field is named `column.QUANTITY`, `unit.COLUMN`, `set.NAME` or `trigger`; another is none of the form's.
 
     >>> import_options({"column.force": "F1", "unit.F1": "kN", "set.mass": "2 kg", "trigger": ""})
     ['--column=force=F1', '--unit=F1=kN', '--set=mass=2 kg']
+    >>> import_options({"output": "/etc/campaign", "trigger": "--mapping=/etc/passwd"})
+    ['--trigger=--mapping=/etc/passwd']
     """
     options = []
     for field, value in choices.items():
+        if not is_choice(field, value):  # stored before such a form was refused
+            continue
         option, _, name = field.partition(".")
         if value and name:
             options.append(f"--{option}={name}={value}")

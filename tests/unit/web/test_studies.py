@@ -288,6 +288,41 @@ async def test_a_mass_is_read_as_the_language_of_the_page_writes_it(
     assert f'placeholder="{"18,9 kg" if language == "de" else "18.9 kg"}"' in text
 
 
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("output", "{dir}/elsewhere"),
+        ("mapping", "{dir}/any.yaml"),
+        ("gain", "force=2 N/V"),
+        ("json", "1"),
+        ("dry-run", "1"),
+        ("column", "force=F"),
+        ("column.", "F"),
+        ("trigger.force", "5 N"),
+        ("output.x", "{dir}/elsewhere"),
+        ("-o", "{dir}/elsewhere"),
+        ("column.force", "a\0b"),
+        ("column.a\0b", "F"),
+    ],
+)
+async def test_only_what_the_form_asks_for_says_how_files_are_read(
+    page: Page, verbs: Verbs, tmp_path: Path, field: str, value: str
+) -> None:
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, _ = await drop(client, "run.csv", b"t;F\n0;1\n", cell="")
+        await until(page, study, Stage.CONFIRMING, Stage.FAILED)
+        asked = len(verbs.asked)
+        form = {"csrf": await csrf_of(client), "column.force": "F", field: value.format(dir=tmp_path)}
+        answer = await client.post(f"/studies/{study}/read", data=form)
+        found = await until(page, study, Stage.CONFIRMING, Stage.FAILED)
+        assert (answer.status_code, found.choices, len(verbs.asked)) == (400, {}, asked)
+        assert "This form cannot be read." in answer.text
+        form = {"csrf": form["csrf"], "trigger": "-o", "set.mass": "--output=/x", "column.-o": "--mapping"}
+        assert (await client.post(f"/studies/{study}/read", data=form)).status_code == 303
+        await until(page, study, Stage.CONFIRMING, Stage.FAILED)
+    assert verbs.asked[-1][-3:] == ["--trigger=-o", "--set=mass=--output=/x", "--column=-o=--mapping"]
+
+
 async def test_ten_at_once_are_done_one_after_the_other(page: Page, verbs: Verbs) -> None:
     verbs.held = asyncio.Event()
     async with page.logged_in(Role.OPERATOR) as client:
