@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from impactcell.errors import CampaignError
+from impactcell.measurements.natural_order import natural_key
 from impactcell.process.background import VerbOutcome, run_verb
 from impactcell.web.studies.campaign_archive import holds_campaign, unpack_campaign
 from impactcell.web.studies.overview import campaign_overview, friction_overview
@@ -122,7 +123,7 @@ class StudyQueue:
     async def _read(self, study: Study) -> None:
         files, campaign = self.store.files(study), self.store.campaign(study)
         await asyncio.to_thread(shutil.rmtree, campaign, ignore_errors=True)
-        names = sorted(study.files)
+        names = sorted(study.files, key=natural_key)  # rows are the order in which shots were taken
         zips = [name for name in names if name.endswith(".zip")]
         if len(names) == 1 and zips and await asyncio.to_thread(holds_campaign, files / names[0]):
             study.begin_step("unpacking")

@@ -323,6 +323,21 @@ async def test_only_what_the_form_asks_for_says_how_files_are_read(
     assert verbs.asked[-1][-3:] == ["--trigger=-o", "--set=mass=--output=/x", "--column=-o=--mapping"]
 
 
+async def test_files_are_read_in_the_order_of_their_numbers(page: Page, verbs: Verbs) -> None:
+    """However they arrive: rows of `shots.csv` are the order in which the shots were taken."""
+    names = ["shot10.csv", "shot2.csv", "shot12.csv", "shot1.csv", "shot11.csv"]
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, _ = await drop(client, names[0], b"t;F\n0;1\n", read=False)
+        csrf = await csrf_of(client)
+        for name in names[1:]:
+            sent = {"params": {"name": name}, "content": b"t;F\n0;1\n", "headers": {"x-csrf-token": csrf}}
+            assert (await client.put(f"/studies/{study}/files", **sent)).status_code == 201  # type: ignore[arg-type]
+        await client.post(f"/studies/{study}/read", data={"csrf": csrf})
+        await until(page, study, Stage.CONFIRMING, Stage.FAILED)
+    given = [Path(argument).name for argument in verbs.asked[0] if argument.endswith(".csv")]
+    assert given == ["shot1.csv", "shot2.csv", "shot10.csv", "shot11.csv", "shot12.csv"]
+
+
 async def test_ten_at_once_are_done_one_after_the_other(page: Page, verbs: Verbs) -> None:
     verbs.held = asyncio.Event()
     async with page.logged_in(Role.OPERATOR) as client:
