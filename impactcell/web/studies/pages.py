@@ -95,9 +95,9 @@ async def read(context: PageContext, request: Request, _: BrowserSession, form: 
         name: messages.understood(value) if name.startswith("set.") or name == "trigger" else value
         for name, value in fields.items()
     }
+    _enqueue_allowed(context)
     if chosen:  # nothing is chosen yet where it is read for the first time
         study.choices = {name: value for name, value in chosen.items() if value}
-    _enqueue_allowed(context)
     context.studies.read(study)
     return _to(study)
 
@@ -128,11 +128,7 @@ async def study_state(context: PageContext, request: Request, session: BrowserSe
 
 def _rendered(context: PageContext, request: Request, session: BrowserSession, template: str) -> Response:
     shown = _study(context, request)
-    may_accept = (
-        session.actor.role >= Role.ENGINEER
-        and bool(shown.cell and shown.result.get("effects"))
-        and not shown.is_working
-    )
+    may_accept = session.actor.role >= Role.ENGINEER and (shown.can_be_accepted or shown.can_be_restored)
     return context.page(
         request,
         template,
@@ -196,8 +192,7 @@ async def _change_model(
 ) -> Response:
     study = _study(context, request)
     extended = context.studies.store.results(study) / "model.extended.yaml"
-    is_possible = study.is_accepted if action == "restore" else bool(study.result.get("effects"))
-    if study.is_working or not study.cell or not is_possible:
+    if not (study.can_be_restored if action == "restore" else study.can_be_accepted):
         raise RequestRefusedError(409, "error_study_stage")
     study.accepting, study.faults = action, []
 

@@ -94,6 +94,8 @@ class StudyQueue:
 
     def _enqueue(self, study: Study, stage: Stage, work: Callable[[Study], Awaitable[None]]) -> None:
         study.stage, study.faults, study.steps = stage, [], []
+        study.result, study.changes = {}, {}  # what came out before is of another reading or question
+        shutil.rmtree(self.store.results(study), ignore_errors=True)
         self._waiting.append((study, work))
         self.store.save(study)
         self._begin_working()
@@ -148,7 +150,6 @@ class StudyQueue:
     async def _study(self, study: Study) -> None:
         results = self.store.results(study)
         results.mkdir(exist_ok=True)
-        study.result, study.changes = {}, {}
         campaign = str(self.store.campaign(study))
         cell = self._cell_files.get(study.cell)
         against = [] if cell is None else ["--cell", str(cell)]

@@ -105,6 +105,17 @@ class Study(msgspec.Struct):
         """Whether its model was the last that it put into service."""
         return bool(self.acceptances) and self.acceptances[-1].action == "accept"
 
+    @property
+    def can_be_accepted(self) -> bool:
+        """Whether a model for its cell came out of what was read last."""
+        has_model = bool(self.cell and self.result.get("effects"))
+        return has_model and self.stage is Stage.DONE and not self.is_working
+
+    @property
+    def can_be_restored(self) -> bool:
+        """Whether its model can be taken out of service."""
+        return bool(self.cell) and self.is_accepted and not self.is_working
+
     def begin_step(self, name: str) -> None:
         """Remember that a step has begun."""
         self.steps = [*self.steps, (name, time.time_ns() // 1_000_000)][-MAX_STEPS:]
@@ -128,9 +139,13 @@ class StudyStore:
         self._may_remove = may_remove
         self._studies = {study.id: study for study in _stored(directory)}
         for study in self._studies.values():
+            if study.stage not in (Stage.DONE, Stage.FAILED):
+                study.result, study.changes = {}, {}  # of a reading before, as earlier versions kept it
             if study.is_working or study.stage is Stage.RECEIVING:
-                study.stage, study.accepting = Stage.FAILED, ""
                 study.faults = ["the service was restarted meanwhile"]
+                # Where a model was changed meanwhile, what came out stands as before.
+                study.stage = study.stage if study.accepting else Stage.FAILED
+                study.accepting = ""
 
     def __iter__(self) -> Iterator[Study]:
         """Give all, the newest first."""

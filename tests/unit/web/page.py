@@ -80,6 +80,8 @@ class Verbs:
     asked: list[list[str]] = field(default_factory=list)
     held: asyncio.Event | None = None
     """While it is there and not set, every verb waits for it."""
+    on_run: Callable[[Sequence[str]], None] | None = None
+    """Called with what is asked for; writes the files, say."""
     running: int = 0
     most_at_once: int = 0
 
@@ -94,6 +96,8 @@ class Verbs:
                 on_step(f"doing {arguments[0]}")
             if self.held is not None:
                 await self.held.wait()
+            if self.on_run is not None:
+                self.on_run(arguments)
             return self.outcomes.get(arguments[0], VerbOutcome(0, "{}", ()))
         finally:
             self.running -= 1

@@ -9,7 +9,7 @@ import shutil
 import statistics
 import threading
 import zipfile
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -197,12 +197,74 @@ async def test_an_engineer_accepts_and_takes_back(page: Page) -> None:
     assert found.faults == ["part would not slide"]
 
 
+def write_model(arguments: Sequence[str]) -> None:
+    """Leave what `discrepancy` does."""
+    if arguments[0] == "discrepancy":
+        results = Path(arguments[arguments.index("-o") + 1])
+        for name in ("model.extended.yaml", "report.html"):
+            (results / name).write_text("of this run")
+
+
+async def test_what_came_out_goes_when_the_files_are_read_again(page: Page, verbs: Verbs) -> None:
+    verbs.on_run = write_model
+    async with page.logged_in(Role.ENGINEER) as client:
+        study, _ = await drop(client, "shots.zip", campaign_zip())
+        found = await until(page, study, Stage.CONFIRMING)
+        csrf = {"csrf": await csrf_of(client)}
+        await client.post(f"/studies/{study}/run", data=csrf | {"goal": "discrepancy"})
+        await until(page, study, Stage.DONE)
+        assert "Missing: viscous friction." in (await client.get(f"/studies/{study}")).text
+        assert (page.studies.store.results(found) / "model.extended.yaml").is_file()
+        assert (await client.post(f"/studies/{study}/read", data=csrf)).status_code == 303
+        kept = (found.result, found.changes, page.studies.store.results(found).exists())
+        assert kept == ({}, {}, False), "from the moment on at which it waits to be read"
+        assert (await client.post(f"/studies/{study}/accept", data=csrf)).status_code == 409
+        await until(page, study, Stage.CONFIRMING)
+        for address in (f"/studies/{study}", f"/studies/{study}/state", "/studies"):
+            text = (await client.get(address)).text
+            assert "Missing: viscous friction." not in text
+            assert "/accept" not in text
+        assert (await client.get(f"/studies/{study}/report")).status_code == 404
+        assert (await client.post(f"/studies/{study}/accept", data=csrf)).status_code == 409
+    assert page.backend.changed == []
+
+
+@pytest.mark.parametrize("stage", [stage for stage in Stage if stage is not Stage.DONE])
+async def test_nothing_is_accepted_but_what_came_out_last(page: Page, stage: Stage) -> None:
+    async with page.logged_in(Role.ENGINEER) as client:
+        study = page.studies.store.begin("rail", "otto", CELL)
+        study.stage, study.result, study.changes = stage, dict(RESULT), dict(CHANGES)
+        assert "/accept" not in (await client.get(f"/studies/{study.id}")).text
+        csrf = {"csrf": await csrf_of(client)}
+        assert (await client.post(f"/studies/{study.id}/accept", data=csrf)).status_code == 409
+    assert page.backend.changed == []
+
+
+async def test_what_was_accepted_can_be_taken_back_after_another_reading(page: Page) -> None:
+    async with page.logged_in(Role.ENGINEER) as client:
+        study, _ = await drop(client, "shots.zip", campaign_zip())
+        await until(page, study, Stage.CONFIRMING)
+        csrf = {"csrf": await csrf_of(client)}
+        await client.post(f"/studies/{study}/run", data=csrf | {"goal": "discrepancy"})
+        await until(page, study, Stage.DONE)
+        await client.post(f"/studies/{study}/accept", data=csrf)
+        await until(page, study, Stage.DONE)
+        await client.post(f"/studies/{study}/read", data=csrf)
+        await until(page, study, Stage.CONFIRMING)
+        text = (await client.get(f"/studies/{study}")).text
+        assert f'action="/studies/{study}/restore"' in text
+        assert "Put into service: extended, eva" in text
+        assert "old → <b>new</b>" not in text
+        assert (await client.post(f"/studies/{study}/restore", data=csrf)).status_code == 303
+        await until(page, study, Stage.CONFIRMING)
+        assert "/restore" not in (await client.get(f"/studies/{study}")).text
+    assert page.backend.changed == [(CELL, "model.extended.yaml", "eva"), (CELL, "", "eva")]
+
+
 async def test_friction_of_each_shot(page: Page, verbs: Verbs) -> None:
     async with page.logged_in(Role.OPERATOR) as client:
         study, _ = await drop(client, "shots.zip", campaign_zip(), cell="")
         await until(page, study, Stage.CONFIRMING)
-        results = page.studies.store.results(page.studies.store.find(study))  # type: ignore[arg-type]
-        results.mkdir()
         rows = [
             {
                 "shot": n,
@@ -216,10 +278,14 @@ async def test_friction_of_each_shot(page: Page, verbs: Verbs) -> None:
         ]
         doubtful = {"quality": "uncertain", "reason": "mu_s 0.3183 is outside the calibrated 0.15-0.26"}
         rows += [rows[0] | {"shot": n, "mu_s": 0.3183, "mu_k": 0.1523412} | doubtful for n in range(3, 250)]
-        with (results / "friction.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, rows[0])
-            writer.writeheader()
-            writer.writerows(rows)
+
+        def write(arguments: Sequence[str]) -> None:
+            with Path(arguments[arguments.index("-o") + 1]).open("w", newline="") as file:
+                writer = csv.DictWriter(file, rows[0])
+                writer.writeheader()
+                writer.writerows(rows)
+
+        verbs.on_run = write
         await client.post(f"/studies/{study}/run", data={"csrf": await csrf_of(client), "goal": "estimate"})
         found = await until(page, study, Stage.DONE)
         values = [float(row["mu_s"]) for row in rows]
@@ -647,6 +713,23 @@ async def test_a_restart_keeps_what_is_done_and_says_what_was_not(tmp_path: Path
     assert again["done"].result == RESULT
     assert again["open"].stage is Stage.FAILED
     assert again["open"].faults == ["the service was restarted meanwhile"]
+
+
+def test_a_restart_forgets_what_came_out_of_another_reading(tmp_path: Path) -> None:
+    """Earlier versions kept it when files were read again; what was being accepted came out of the last."""
+    store = StudyStore(tmp_path)
+    for stage, accepting in ((Stage.CONFIRMING, ""), (Stage.READING, ""), (Stage.DONE, "accept")):
+        study = store.begin(stage.value, "otto", CELL)
+        study.stage, study.accepting, study.result, study.changes = stage, accepting, RESULT, CHANGES
+        store.save(study)
+    again = {study.title: study for study in StudyStore(tmp_path)}
+    assert {title: (study.stage, bool(study.result)) for title, study in again.items()} == {
+        "confirming": (Stage.CONFIRMING, False),
+        "reading": (Stage.FAILED, False),
+        "done": (Stage.DONE, True),
+    }
+    assert again["done"].can_be_accepted
+    assert again["done"].faults == ["the service was restarted meanwhile"]
 
 
 def test_the_oldest_make_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
