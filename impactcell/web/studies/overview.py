@@ -3,10 +3,12 @@
 import csv
 import math
 from collections import Counter
+from itertools import islice
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any, Final
 
+from impactcell.campaign.faults import Faults
 from impactcell.errors import CampaignError
 
 MAX_ROWS: Final = 5000
@@ -21,7 +23,7 @@ def campaign_overview(directory: Path) -> dict[str, Any]:
     Raises
     ------
     CampaignError
-        It has no table of shots that can be read.
+        It has no table of shots that can be read, or one whose rows are not as wide as its header.
     """
     if not directory.exists():
         return {}
@@ -69,11 +71,21 @@ def friction_overview(table: Path) -> dict[str, Any]:
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
+    rows, faults = [], Faults(Path(path.name))
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
-            return [row for row, _ in zip(csv.DictReader(file), range(MAX_ROWS), strict=False)]
+            reader = csv.reader(file)
+            filled = (row for row in reader if any(cell.strip() for cell in row))
+            names = [name.strip() for name in next(filled, [])]
+            for row in islice(filled, MAX_ROWS):
+                if len(row) != len(names):  # in the words of what reads it later
+                    told = f"{len(row)} cells where the header has {len(names)}"
+                    faults.add(Path(path.name), reader.line_num, told)
+                rows.append(dict(zip(names, row, strict=False)))
     except (OSError, ValueError, csv.Error) as error:
         raise CampaignError(f"{path.name}: cannot be read ({error})") from error
+    faults.raise_any()
+    return rows
 
 
 def _header(path: Path) -> list[str]:

@@ -12,6 +12,12 @@ from impactcell.web.texts.import_notes import page_note
 FAULTS: Final = (
     *FAULTS_BETWEEN_FILES,
     FaultPattern(
+        r"(?P<cells>\d+) cells where the header has (?P<names>\d+)",
+        "{cells} cells where the header has {names}",
+        "{cells} Zellen, die Kopfzeile hat {names}",
+    ),
+    FaultPattern(r"and (?P<count>\d+) more faults", "and {count} more faults", "und {count} weitere Fehler"),
+    FaultPattern(
         r"no column of time was found(?P<why>.*); name it with --column .*",
         "no column of time was found{why}; choose it in the form below, or give the sampling rate there",
         "keine Zeitspalte gefunden{why}; unten im Formular wählen, oder dort die Abtastrate angeben",

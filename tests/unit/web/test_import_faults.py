@@ -46,6 +46,11 @@ def faults_of(directory: Path, text: str, given: Given = NOTHING_GIVEN) -> list[
     return str(error.value).splitlines()
 
 
+def test_further_faults_are_counted_in_both_languages() -> None:
+    assert page_fault("shots.csv: and 4 more faults", "en") == ("en", "shots.csv: and 4 more faults")
+    assert page_fault("shots.csv: and 4 more faults", "de") == ("de", "shots.csv: und 4 weitere Fehler")
+
+
 def test_a_stroke_that_no_actuator_has_is_said_in_both_languages() -> None:
     with pytest.raises(MeasurementError) as error:
         read_given({"constants": ["stroke=1.5 m"]})

@@ -16,6 +16,7 @@ from typing import Any
 import httpx
 import pytest
 
+from impactcell.campaign import read
 from impactcell.errors import CampaignError
 from impactcell.process.background import VerbOutcome
 from impactcell.scada import Role
@@ -559,6 +560,33 @@ async def test_an_upload_that_stalls_or_breaks_off_leaves_nothing(
     assert found is not None
     assert list(found.files) == ["a.csv"]
     assert [path.name for path in page.studies.store.files(found).iterdir()] == ["a.csv"]
+
+
+async def test_rows_that_are_wider_than_the_header_are_told_as_they_are_elsewhere(
+    page: Page, tmp_path: Path
+) -> None:
+    """A mass with a decimal comma is two cells."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as packed:
+        packed.writestr("campaign.yaml", "format: 1\nexcitation: tap\n")
+        packed.writestr("shots.csv", "shot,velocity_mm_per_min,mass_kg\n1,4000,18,9\n\n2,5000,3\n3,5000\n")
+        for shot in (1, 2, 3):
+            packed.writestr(f"traces/{shot}.csv", "time_s,force_n\n0,0\n")
+    async with page.logged_in(Role.OPERATOR) as client:
+        study, _ = await drop(client, "shots.zip", content.getvalue())
+        found = await until(page, study, Stage.FAILED)
+        shown = {code: (await client.get(f"/studies/{study}?lang={code}")).text for code in ("en", "de")}
+    assert found.faults == [
+        "shots.csv:2: 4 cells where the header has 3",
+        "shots.csv:5: 2 cells where the header has 3",
+    ]
+    assert '<li lang="en">shots.csv:2: 4 cells where the header has 3</li>' in shown["en"]
+    assert '<li lang="de">shots.csv:2: 4 Zellen, die Kopfzeile hat 3</li>' in shown["de"]
+    with zipfile.ZipFile(content) as packed:
+        packed.extractall(tmp_path / "campaign")
+    with pytest.raises(CampaignError) as told:
+        read(tmp_path / "campaign")
+    assert str(told.value).replace(f"{tmp_path}/campaign/", "").splitlines()[:2] == found.faults
 
 
 def bomb() -> bytes:
