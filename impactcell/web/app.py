@@ -2,6 +2,7 @@
 
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from http import HTTPStatus
 from typing import Final
 from urllib.parse import quote
 
@@ -191,7 +192,10 @@ def _uploader(context: PageContext, request: Request, role: Role) -> BrowserSess
 def _refused(context: PageContext) -> Callable[[Request, Exception], Awaitable[Response]]:
     async def handle(request: Request, error: Exception) -> Response:
         assert isinstance(error, RequestRefusedError)  # noqa: S101 - it is registered for these
-        return context.error_page(request, error.status, error.reason)
+        response = context.error_page(request, error.status, error.reason)
+        if error.status == HTTPStatus.REQUEST_TIMEOUT:  # what still comes is not waited for
+            response.headers["connection"] = "close"
+        return response
 
     return handle
 

@@ -1,5 +1,6 @@
 """What comes from a browser, judged before anything is done with it: who, from where, how much."""
 
+import asyncio
 import secrets
 from typing import Final
 from urllib.parse import parse_qs, urlsplit
@@ -10,6 +11,8 @@ from impactcell.web.sessions import BrowserSession, SessionTable
 
 MAX_FORM_BYTES: Final = 16_384
 """Longest form: a comment, percent-encoded, with room to spare."""
+FORM_S: Final = 10.0
+"""How long a form may take to come, as long as the head before it: 13 kbit/s."""
 MAX_FIELDS: Final = 64
 """Fields of a form."""
 CSRF_FIELD: Final = "csrf"
@@ -68,16 +71,20 @@ async def read_form(request: Request) -> dict[str, str]:
     Raises
     ------
     RequestRefusedError
-        It comes from elsewhere, is too long, or is no form.
+        It comes from elsewhere, is too long or too slow, or is no form.
     """
     check_origin(request)
     if not request.headers.get("content-type", "").startswith("application/x-www-form-urlencoded"):
         raise RequestRefusedError(415, "error_form")
     body = bytearray()
-    async for chunk in request.stream():
-        body += chunk
-        if len(body) > MAX_FORM_BYTES:
-            raise RequestRefusedError(413, "error_too_long")
+    try:
+        async with asyncio.timeout(FORM_S):
+            async for chunk in request.stream():
+                body += chunk
+                if len(body) > MAX_FORM_BYTES:
+                    raise RequestRefusedError(413, "error_too_long")
+    except TimeoutError as error:
+        raise RequestRefusedError(408, "error_form_slow") from error
     try:
         fields = parse_qs(
             body.decode(), keep_blank_values=True, strict_parsing=bool(body), max_num_fields=MAX_FIELDS

@@ -44,6 +44,7 @@ PAGE_TEXTS: Texts = {
     ),
     "error_foreign": ("This request came from another page.", "Diese Anfrage kam von einer anderen Seite."),
     "error_form": ("This form cannot be read.", "Dieses Formular ist nicht lesbar."),
+    "error_form_slow": ("This form came too slowly.", "Dieses Formular kam zu langsam."),
     "error_too_long": ("This form is too long.", "Dieses Formular ist zu lang."),
     "error_token": (
         "This form belongs to another session; go back and load the page again.",

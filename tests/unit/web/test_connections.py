@@ -5,16 +5,18 @@ import logging
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
 
 from impactcell.scada.users import User, write_users
-from impactcell.web import connections
+from impactcell.web import connections, requests
 from impactcell.web.interface import CellFacts, PageSettings
 from impactcell.web.server import PageServer
 from tests.patience import PATIENCE_S
-from tests.unit.web.page import CELL, NAMES, Backend
+from tests.unit.web.page import CELL, NAMES, Backend, make_page
+from tests.virtual_time import run_virtually
 
 Streams = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 
@@ -66,6 +68,48 @@ async def test_who_does_not_finish_a_head_is_let_go(
     streams = await connect(server)
     streams[1].write(said)
     await ended(streams)
+
+
+FORM = b"Content-Type: application/x-www-form-urlencoded\r\nContent-Length: 100\r\n\r\n"
+
+
+@pytest.mark.parametrize("said", [b"", b"user=eva"], ids=["nothing", "half a form"])
+async def test_who_does_not_finish_a_form_is_told_and_let_go(
+    server: PageServer, said: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(requests, "FORM_S", 0.05)
+    streams = await connect(server)
+    head = await answer(streams, b"POST /login HTTP/1.1\r\nHost: h\r\n" + FORM + said)
+    assert head == b"HTTP/1.1 408 Request Timeout\r\n"
+    await ended(streams)
+
+
+def test_a_form_that_drips_has_its_time_and_no_more(tmp_path: Path) -> None:
+    """A byte a second keeps no connection; the time that passes is none of the clock's."""
+
+    async def dripping() -> tuple[float, list[Any]]:
+        page, sent = make_page(tmp_path), []
+
+        async def receive() -> dict[str, Any]:
+            await asyncio.sleep(1.0)
+            return {"type": "http.request", "body": b"u", "more_body": True}
+
+        async def send(message: dict[str, Any]) -> None:
+            sent.append(message)
+
+        headers = {b"host": b"127.0.0.1:8480", b"content-type": b"application/x-www-form-urlencoded"}
+        scope = {
+            "type": "http", "method": "POST", "path": "/login", "query_string": b"lang=de",
+            "headers": list(headers.items()), "http_version": "1.1", "root_path": "",
+            "scheme": "http", "server": ("127.0.0.1", 8480), "client": ("127.0.0.1", 1),
+        }  # fmt: skip
+        await page.app(scope, receive, send)  # type: ignore[operator]
+        return asyncio.get_running_loop().time(), sent
+
+    took_s, (head, body, *_) = run_virtually(dripping())
+    assert took_s == pytest.approx(requests.FORM_S)
+    assert (head["status"], dict(head["headers"])[b"connection"]) == (408, b"close")
+    assert "Dieses Formular kam zu langsam." in body["body"].decode()
 
 
 async def test_the_second_head_has_its_time_too(server: PageServer, monkeypatch: pytest.MonkeyPatch) -> None:
