@@ -10,6 +10,7 @@ from impactcell.campaign.header import Header, read_header
 from impactcell.campaign.shots import ShotRow, read_shots
 from impactcell.campaign.trace import read_trace
 from impactcell.numerics.raster import raster_of
+from impactcell.process.path_kind import Kind, kind_at
 from impactcell.records import Capture, Channel
 
 FINE_RASTER = 0.1
@@ -41,8 +42,9 @@ def read(directory: Path) -> Campaign:
         Every fault of every file, as `file:line: what is wrong; the way out`.
     """
     faults = Faults(directory)
-    if not directory.is_dir():
-        faults.add(directory, None, "is not a directory; name the directory that holds campaign.yaml")
+    if not _is_directory(
+        directory, "is not a directory; name the directory that holds campaign.yaml", faults
+    ):
         faults.raise_any()
     header = read_header(directory / "campaign.yaml", faults)
     table = read_shots(
@@ -52,12 +54,10 @@ def read(directory: Path) -> Campaign:
         header.coordinate if header else Coordinate.TRANSLATION,
     )
     traces = directory / "traces"
-    if not traces.is_dir():
-        faults.add(traces, None, "is missing; it holds N.csv for every shot N")
-    elif table is not None:
-        _check_orphans(traces, {shot.number for shot in table[1]}, faults)
+    has_traces = _is_directory(traces, "is missing; it holds N.csv for every shot N", faults)
     shots: list[Capture] = []
-    if traces.is_dir() and table is not None:
+    if has_traces and table is not None:
+        _check_orphans(traces, {shot.number for shot in table[1]}, faults)
         for shot in table[1]:
             capture = _capture(traces / f"{shot.number}.csv", shot, header, faults)
             if capture is not None:
@@ -75,6 +75,18 @@ def read(directory: Path) -> Campaign:
         columns=table[0],
         coordinate=header.coordinate,
     )
+
+
+def _is_directory(path: Path, otherwise: str, faults: Faults) -> bool:
+    """Whether there is a directory; what is wrong where there is none is noted."""
+    try:
+        kind = kind_at(path)
+    except OSError as error:
+        faults.add(path, None, f"cannot be read: {error.strerror}")
+        return False
+    if kind is not Kind.DIRECTORY:
+        faults.add(path, None, otherwise)
+    return kind is Kind.DIRECTORY
 
 
 def _from_start(shots: tuple[Capture, ...], name: str) -> tuple[Capture, ...]:

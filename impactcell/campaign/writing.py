@@ -10,6 +10,7 @@ import numpy as np
 from impactcell.campaign.contents import CHANNELS, COLUMNS, Campaign, Coordinate
 from impactcell.campaign.header import FORMAT
 from impactcell.errors import CampaignError
+from impactcell.process.path_kind import Kind, kind_at
 from impactcell.process.whole_files import directory_beside
 from impactcell.records import MM_PER_MIN, Capture, Channel
 
@@ -28,13 +29,8 @@ def write(campaign: Campaign, directory: Path) -> None:
     if len(set(numbers)) < len(numbers):
         message = f"{directory}: two shots have the same number; number them anew"
         raise CampaignError(message)
-    if directory.is_symlink():
-        message = f"{directory}: is a symbolic link; name the directory itself"
-        raise CampaignError(message)
-    if directory.exists() and (not directory.is_dir() or any(directory.iterdir())):
-        message = f"{directory}: exists already; choose another name or remove it"
-        raise CampaignError(message)
     try:
+        _check_place(directory)
         with directory_beside(directory) as beside:
             (beside / "campaign.yaml").write_text(_header(campaign), encoding="utf-8")
             (beside / "shots.csv").write_text(_shots(campaign), encoding="utf-8")
@@ -48,6 +44,16 @@ def write(campaign: Campaign, directory: Path) -> None:
     except OSError as error:
         message = f"{directory}: cannot be written: {error.strerror}"
         raise CampaignError(message) from error
+
+
+def _check_place(directory: Path) -> None:
+    kind = kind_at(directory)
+    if directory.is_symlink():
+        message = f"{directory}: is a symbolic link; name the directory itself"
+        raise CampaignError(message)
+    if kind is Kind.FILE or (kind is Kind.DIRECTORY and any(directory.iterdir())):
+        message = f"{directory}: exists already; choose another name or remove it"
+        raise CampaignError(message)
 
 
 def _header(campaign: Campaign) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from cryptography import x509
 
-from impactcell.cli.paths import check_directory, check_output
+from impactcell.cli.paths import check_directory, check_output, kind_of
 from impactcell.errors import AccessError
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
 from impactcell.opcua.host_interface import Role
@@ -20,6 +20,7 @@ from impactcell.opcua.trust_list import (
     thumbprint,
 )
 from impactcell.process.console import print_result
+from impactcell.process.path_kind import Kind
 from impactcell.scada.interface import default_application_uri
 from impactcell.scada.rights import matrix_table
 from impactcell.scada.users import User, read_users, with_password, write_users
@@ -105,7 +106,7 @@ def list_users(file: Path, *, rights: bool = False) -> None:
     AccessError
         The file is absent or cannot be used.
     """
-    if not file.exists():
+    if kind_of(file, AccessError) is Kind.NOTHING:
         raise AccessError(
             f"{file}: is not there; make it with `impactcell users add {shlex.quote(str(file))} NAME`"
         )
@@ -175,9 +176,10 @@ def list_certs(pki: Path) -> None:
     AccessError
         The directory is absent, or a file.
     """
-    if pki.exists() and not pki.is_dir():
+    kind = kind_of(pki, AccessError)
+    if kind is Kind.FILE:
         raise AccessError(f"{pki}: is a file; name the directory that holds own, trusted and rejected")
-    if not pki.exists():
+    if kind is Kind.NOTHING:
         raise AccessError(f"{pki}: is not there; make it with `impactcell certs make {pki}`")
     for folder in FOLDERS:
         for path in sorted((pki / folder).glob("*")):

@@ -18,13 +18,14 @@ from impactcell.api.first_model import fit_first_model
 from impactcell.campaign import Campaign, read
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.first_model import say_first_model
-from impactcell.cli.paths import check_directory
+from impactcell.cli.paths import check_directory, kind_of
 from impactcell.errors import PredictionError, SettingsError
 from impactcell.features import noise_std
 from impactcell.physics import Plant
 from impactcell.prediction import PROVISIONAL, Model
 from impactcell.prediction.model import Prior
 from impactcell.process.console import print_note, print_result
+from impactcell.process.path_kind import Kind
 from impactcell.process.shipped import shipped_config
 from impactcell.records.plausible_range import STROKE
 from impactcell.settings import read_cell, read_register_map
@@ -222,7 +223,7 @@ def _with_measured_noise(answers: Answers, taps: Campaign) -> Answers:
 
 def _map_file(name: str) -> Path:
     for path in (Path(name), shipped_config() / "maps" / f"{name}.yaml"):
-        if path.is_file():
+        if kind_of(path, SettingsError) is Kind.FILE:
             return path
     known = ", ".join(sorted(path.stem for path in (shipped_config() / "maps").glob("*.yaml")))
     raise SettingsError(f"there is no register map {name}; name a file, or one of {known}")

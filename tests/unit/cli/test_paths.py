@@ -1,10 +1,16 @@
 """What a verb is given is looked at before it works, and found wanting as bad input."""
 
+import errno
+import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from impactcell.__main__ import main
+from impactcell.campaign import Campaign, Excitation, write
+from impactcell.errors import CampaignError
+from impactcell.records import Capture, Channel
 
 CELL = str(Path(__file__).resolve().parents[3] / "config" / "cells" / "prototype.yaml")
 
@@ -79,3 +85,73 @@ def test_a_place_that_is_somebody_elses_is_told_before_the_work(
     assert end.value.code == 2
     assert f"out: cannot be written: you may not write in {tmp_path}; name" in capsys.readouterr().err
     assert asked == [tmp_path]
+
+
+@pytest.fixture
+def theirs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A directory of somebody else's; root, who may look everywhere, is refused as others are."""
+    place, look = tmp_path / "theirs", Path.stat
+
+    def stat(path: Path, *, follow_symlinks: bool = True) -> os.stat_result:
+        if place in path.parents:
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+        return look(path, follow_symlinks=follow_symlinks)
+
+    monkeypatch.setattr(Path, "stat", stat)
+    place.mkdir()
+    return place
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("estimate", "{dir}/c"), "{dir}/c: cannot be read: Permission denied"),
+        (("estimate", "none", "-o", "{dir}/out.csv"), "{dir}/out.csv: cannot be written: Permission denied"),
+        (("discrepancy", "{dir}/c", "-o", "out"), "{dir}/c: cannot be read: Permission denied"),
+        (("discrepancy", "none", "-o", "{dir}/r"), "{dir}/r: cannot be written: Permission denied"),
+        (("discrepancy", "none", "-o", "{dir}/a/r"), "{dir}/a/r: cannot be written: Permission denied"),
+        (("discrepancy", "--journal", "{dir}/j", "-o", "r"), "{dir}/j: cannot be read: Permission denied"),
+        (("export", "{dir}/j", "-o", "out"), "{dir}/j: cannot be read: Permission denied"),
+        (("calibrate", CELL, "-o", "{dir}/m.yaml"), "{dir}/m.yaml: cannot be written: Permission denied"),
+        (("init", "{dir}/cell", *CELL_ANSWERS), "{dir}/cell: cannot be written: Permission denied"),
+        (("init", "cell", *CELL_ANSWERS, "--map", "{dir}/m"), "{dir}/m: cannot be read: Permission denied"),
+        (("users", "add", "{dir}/u.yaml", "eva"), "{dir}/u.yaml: cannot be written: Permission denied"),
+        (("users", "list", "{dir}/u.yaml"), "{dir}/u.yaml: cannot be read: Permission denied"),
+        (("certs", "list", "{dir}/pki"), "{dir}/pki: cannot be read: Permission denied"),
+        (("certs", "make", "{dir}/pki"), "{dir}/pki: cannot be written: Permission denied"),
+    ],
+)
+def test_what_nobody_may_look_at_is_bad_input(
+    theirs: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    told: str,
+) -> None:
+    monkeypatch.chdir(theirs.parent)
+    with pytest.raises(SystemExit) as end:
+        main([argument.format(dir=theirs) for argument in arguments])
+    out, err = capsys.readouterr()
+    assert (end.value.code, out) == (2, "")
+    assert err.startswith(told.format(dir=theirs))
+    assert err.count("\n") == 1
+    assert list(theirs.parent.iterdir()) == [theirs]
+
+
+def test_a_campaign_is_not_written_where_nobody_may_look(theirs: Path) -> None:
+    shot = Capture(1, 0.05, 18.9, force=Channel(np.arange(3.0), np.ones(3), 0.4), position=None)
+    taps = Campaign(Excitation.TAP, (shot,), columns=("shot", "velocity_mm_per_min"))
+    with pytest.raises(CampaignError, match="theirs/c: cannot be written: Permission denied"):
+        write(taps, theirs / "c")
+
+
+def test_a_directory_that_is_there_and_somebody_elses_is_told_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    monkeypatch.setattr("os.access", lambda path, mode: path != out or not mode & os.W_OK)
+    with pytest.raises(SystemExit) as end:
+        main(["discrepancy", str(tmp_path / "none"), "-o", str(out)])
+    assert end.value.code == 2
+    assert f"out: cannot be written: you may not write in {out}; name" in capsys.readouterr().err
