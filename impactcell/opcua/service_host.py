@@ -188,13 +188,19 @@ class ServiceHost:
                 self._sessions.remove(session)
 
     async def _run_clock(self) -> None:
+        goes_well = True
         while True:
-            self._tick()
+            try:
+                self._tick()
+                goes_well = True
+            except Exception:  # noqa: BLE001 - sessions end by this clock, and removed users with them
+                if goes_well:  # told once, not each second
+                    _log.exception("OPC UA clock: a fault of this program; the clock goes on")
+                goes_well = False
             await asyncio.sleep(CLOCK_PERIOD_S)
 
     def _tick(self) -> None:
-        now = datetime.now(UTC)
-        ids = ua.ObjectIds
+        now, ids = datetime.now(UTC), ua.ObjectIds
         self._values.set_value(
             ua.NodeId(ids.Server_ServerStatus_CurrentTime), now, ua.VariantType.DateTime, now
         )

@@ -24,6 +24,7 @@ from argon2.exceptions import Argon2Error, InvalidHashError
 from impactcell.errors import AccessError, SettingsError
 from impactcell.opcua.host_interface import RegisteredUser, Role
 from impactcell.process import yaml_loader
+from impactcell.process.path_kind import Kind, kind_at
 from impactcell.process.whole_files import write_whole
 
 _log = logging.getLogger(__name__)
@@ -54,10 +55,15 @@ def read_users(path: Path) -> dict[str, User]:
     AccessError
         The file cannot be read or is not a users file; the message names the entry.
     """
-    if not path.exists():
+    try:
+        kind = kind_at(path)
+    except OSError as error:  # what may not be looked at holds nobody who may log in, and is told
+        told = f"cannot be read: {error.strerror}; let who runs this read it, or name another"
+        raise AccessError(f"{path}: {told}") from error
+    if kind is Kind.NOTHING:
         return {}
     way_out = f"move it away, and make one with `impactcell users add {shlex.quote(str(path))} NAME`"
-    if path.is_dir():
+    if kind is Kind.DIRECTORY:
         raise AccessError(f"{path}: is a directory, where a users file is needed; name a file in it")
     try:
         data, _ = yaml_loader.load(path)

@@ -2,6 +2,8 @@
 
 import asyncio
 import contextlib
+import errno
+import os
 from collections.abc import AsyncIterator, Awaitable
 from dataclasses import replace
 from pathlib import Path
@@ -174,6 +176,62 @@ async def test_users_file_is_read_without_a_restart() -> None:
             with pytest.raises(ua.UaStatusCodeError) as refused:
                 await asyncio.wait_for(read_for_ever(), PATIENCE_S)
             assert refused.value.code == codes.BadSessionIdInvalid, "the session of a removed user goes on"
+
+
+async def clock_moves(client: Client) -> None:
+    """Wait until the server has looked at its clock again."""
+    clock = client.get_node(ua.ObjectIds.Server_ServerStatus_CurrentTime)
+    before = await clock.read_value()
+    async with asyncio.timeout(PATIENCE_S):
+        while await clock.read_value() == before:
+            pass
+
+
+async def test_a_users_file_that_may_not_be_looked_at_is_told_and_survived(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    async with site() as here:
+        look = Path.stat
+
+        def stat(path: Path, *, follow_symlinks: bool = True) -> os.stat_result:
+            if path == here.directory / "users.yaml":
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+            return look(path, follow_symlinks=follow_symlinks)
+
+        async with await here.client("observer") as client:
+            node = await here.node(client, "Model/Name")
+
+            async def read_for_ever() -> None:
+                while True:
+                    await node.read_data_value(raise_on_bad_status=False)
+
+            with monkeypatch.context() as barred:
+                barred.setattr(Path, "stat", stat)
+                with pytest.raises(ua.UaStatusCodeError) as refused:
+                    await asyncio.wait_for(read_for_ever(), PATIENCE_S)
+                assert refused.value.code == codes.BadSessionIdInvalid
+                assert await refusal(await here.client("observer")) == codes.BadUserAccessDenied
+        assert "nobody can log in: " in caplog.text
+        assert "users.yaml: cannot be read: Permission denied; let who runs this read it" in caplog.text
+        async with await here.client("observer") as client:
+            await clock_moves(client)
+
+
+async def test_the_clock_goes_on_whatever_it_meets(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("impactcell.opcua.service_host.CLOCK_PERIOD_S", 0.01)
+    async with site() as here:
+        async with await here.client("observer") as client:
+            with monkeypatch.context() as faulty:
+                faulty.setattr("impactcell.scada.users.Users.find", lambda *_: 1 / 0)
+                for _ in range(3):
+                    await clock_moves(client)
+            for _ in range(3):
+                await clock_moves(client)
+    told = [record for record in caplog.records if record.levelname == "ERROR"]
+    assert [record.message for record in told] == ["OPC UA clock: a fault of this program; the clock goes on"]
+    assert told[0].exc_info is not None
 
 
 async def test_a_session_belongs_to_its_client() -> None:
