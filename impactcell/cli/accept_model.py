@@ -16,6 +16,7 @@ from impactcell.errors import ImpactCellError, PredictionError, SettingsError
 from impactcell.physics.law_table import NOMINAL_PARAMETERS
 from impactcell.prediction import Model
 from impactcell.process.console import print_note, print_result
+from impactcell.process.whole_files import write_whole
 from impactcell.settings import CellConfig, read_cell
 from impactcell.settings.judgement import judge_cell
 from impactcell.settings.model_file import read_model, write_model
@@ -89,12 +90,38 @@ def put_into_service(config: CellConfig, model: Model) -> Path:
     previous, taking = previous_model(target), in_place_of(config.model, model)
     if taking == config.model:
         return previous
-    try:
-        previous.write_bytes(target.read_bytes())
-    except OSError as error:
-        raise SettingsError(f"{previous}: cannot be written: {error.strerror}") from error
-    write_model(taking, target)
+    _replace(target, taking, previous)
     return previous
+
+
+def _replace(target: Path, model: Model, previous: Path) -> None:
+    """Write a model in the place of the one in service, which is kept as the previous one; no step loses one.
+
+    Raises
+    ------
+    SettingsError
+        A file cannot be written.
+    """
+    beside = previous.with_name(f"{previous.name}.new")
+    try:
+        write_whole(beside, target.read_bytes().decode())
+    except OSError as error:
+        raise SettingsError(
+            f"{previous}: cannot be written: {error.strerror}; nothing was changed: "
+            f"let who runs this write in {previous.parent}, and do it again"
+        ) from error
+    try:
+        write_model(model, target)
+    except SettingsError:
+        beside.unlink(missing_ok=True)
+        raise
+    try:
+        beside.replace(previous)
+    except OSError as error:
+        raise SettingsError(
+            f"{previous}: cannot be written: {error.strerror}; {model.name} is in service, and the model "
+            f"before it lies in {beside}: move it there"
+        ) from error
 
 
 def restore_model(cell: Path, *, as_json: bool = False) -> None:
@@ -111,9 +138,7 @@ def restore_model(cell: Path, *, as_json: bool = False) -> None:
     if not previous.is_file():
         raise SettingsError(f"{previous}: there is none; nothing has been accepted in this cell")
     model = read_model(previous)
-    in_service = target.read_bytes()
-    write_model(model, target)
-    previous.write_bytes(in_service)
+    _replace(target, model, previous)
     if model.is_provisional:
         print_note(
             f"{model.name} is the guess that `impactcell model fit` replaced: nothing of it was measured; "

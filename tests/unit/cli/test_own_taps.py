@@ -1,7 +1,11 @@
 """A model that the cell's own last taps speak against is not put into service unasked."""
 
+import errno
 import json
 import math
+import os
+import re
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -138,6 +142,89 @@ def test_a_dry_run_sees_that_the_model_before_could_not_be_kept(cell: Path) -> N
             run_verb(["model", "accept", str(cell), str(other), *dry])
         said.append(str(refused.value))
     assert said[0] == said[1]
+
+
+@pytest.fixture
+def accepted(cell: Path, capsys: pytest.CaptureFixture[str]) -> Path:
+    """Cell without taps of its own in which a model was accepted; somebody has written in its file since."""
+    (cell.parent / "own.sqlite").unlink()
+    other = cell.parent / "other.yaml"
+    write_model(oily(read_cell(cell).model), other)
+    with pytest.raises(SystemExit):
+        run_verb(["model", "accept", str(cell), str(other)])
+    target = cell.parent / "model.yaml"
+    target.write_bytes(b"# ours: \xc3\xb6l\r\n" + target.read_bytes())
+    other.unlink()
+    return cell
+
+
+def files(directory: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in directory.glob("model*")}
+
+
+def bar(monkeypatch: pytest.MonkeyPatch, barred: str) -> None:
+    """Let nobody write what begins with a name: not in its place, and not beside it."""
+    make, write = tempfile.mkstemp, Path.write_bytes
+    refused = PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    def mkstemp(*, dir: Path, prefix: str) -> tuple[int, str]:  # noqa: A002 - as it is called
+        if prefix.startswith(f".{barred}"):
+            raise refused
+        return make(dir=dir, prefix=prefix)
+
+    def write_bytes(path: Path, data: bytes) -> int:
+        if path.name.startswith(barred):
+            raise refused
+        return write(path, data)
+
+    monkeypatch.setattr(tempfile, "mkstemp", mkstemp)
+    monkeypatch.setattr(Path, "write_bytes", write_bytes)
+
+
+def test_the_model_before_comes_back_and_the_one_in_service_takes_its_place(accepted: Path) -> None:
+    before = files(accepted.parent)
+    with pytest.raises(SystemExit):
+        run_verb(["model", "restore", str(accepted)])
+    assert read_cell(accepted).model == read_cell(CONFIG / "cells" / "prototype.yaml").model
+    after = files(accepted.parent)
+    assert sorted(after) == ["model.previous.yaml", "model.yaml"]
+    assert after["model.previous.yaml"] == before["model.yaml"], "to the byte"
+
+
+@pytest.mark.parametrize("verb", ["accept", "restore"])
+@pytest.mark.parametrize("barred", ["model.previous.yaml", "model.yaml"])
+def test_no_model_is_lost_where_one_cannot_be_written(
+    accepted: Path, monkeypatch: pytest.MonkeyPatch, barred: str, verb: str
+) -> None:
+    before, other = files(accepted.parent), accepted.parent / "third.yaml"
+    write_model(replace(read_cell(accepted).model, name="third"), other)
+    bar(monkeypatch, barred)
+    said = f"{accepted.parent / barred}: cannot be written: Permission denied"
+    with pytest.raises(SettingsError, match=re.escape(said)) as told:
+        run_verb(["model", verb, str(accepted), *([str(other)] if verb == "accept" else [])])
+    assert files(accepted.parent) == before
+    way_out = f"nothing was changed: let who runs this write in {accepted.parent}, and do it again"
+    assert (way_out in str(told.value)) is (barred == "model.previous.yaml")
+
+
+def test_where_the_model_before_cannot_be_moved_it_is_told_where_it_lies(
+    accepted: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    in_service, move = (accepted.parent / "model.yaml").read_bytes(), Path.replace
+
+    def refused(path: Path, target: Path) -> Path:
+        if target.name == "model.previous.yaml":
+            raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
+        return move(path, target)
+
+    monkeypatch.setattr(Path, "replace", refused)
+    beside = accepted.parent / "model.previous.yaml.new"
+    with pytest.raises(
+        SettingsError, match=re.escape(f"the model before it lies in {beside}: move it there")
+    ):
+        run_verb(["model", "restore", str(accepted)])
+    assert beside.read_bytes() == in_service
+    assert read_cell(accepted).model.name == "prototype"
 
 
 def test_a_cell_without_taps_of_its_own_takes_any_model(
