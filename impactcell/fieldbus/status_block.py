@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from impactcell.fieldbus.positioning_registers import SHOWN
 from impactcell.fieldbus.registers import Register, RegisterMap, Value
 from impactcell.records import BatchAnnouncement
 
@@ -62,14 +63,11 @@ class StatusBlock:
 STATUS_REGISTERS = (
     "state", "session", "cycle_counter", "ring_cycle",
     "batch_sequence", "batch_from_cycle", "batch_announced",
-    "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
-    "command_accepted", "command_cycle", "status_crc32",
+    *SHOWN, "status_crc32",
 )  # fmt: skip
 """Registers of a poll, where the map has them."""
 
 _BATCH = ("batch_sequence", "batch_from_cycle", "batch_announced")
-_POSITIONING = STATUS_REGISTERS[7:-1]
-"""Those of a positioning cell."""
 
 
 def _code_name(register: Register, value: Value) -> str:
@@ -96,7 +94,7 @@ def decode_status(registers: RegisterMap, values: Mapping[str, Value]) -> Status
             integer(values["batch_from_cycle"]),
             str(values["batch_announced"]),
         )
-    if all(name in values for name in _POSITIONING):
+    if all(name in values for name in SHOWN):
         positioning = PositioningStatus(
             state=_code_name(registers["positioning_state"], values["positioning_state"]),
             result=_code_name(registers["command_result"], values["command_result"]),

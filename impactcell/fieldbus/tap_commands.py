@@ -13,13 +13,13 @@ from typing import Final
 
 from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, PositioningError, ProtocolError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
+from impactcell.fieldbus.positioning_registers import COMMAND, DONE, EXECUTING, PARAMETERS, READY
 from impactcell.fieldbus.status_block import PositioningStatus
 
 _POLL_S: Final = 0.005
 """Between two looks at the outcome of a tap, seconds: a tenth of the shortest tap and slide."""
 _REFUSALS: Final = frozenset({1, 2, 3})
 """Exception codes of a request that will never do (function, address, value); all others may pass."""
-_PARAMETERS: Final = ("command_velocity", "command_stroke", "command_direction")
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,9 +48,7 @@ class TapCommander:
     @property
     def available(self) -> bool:
         """Whether the module's map has the registers of a positioning cell."""
-        return all(
-            name in self._module.registers for name in (*_PARAMETERS, "command_sequence", "command_result")
-        )
+        return all(name in self._module.registers for name in (*COMMAND, "command_result"))
 
     async def tap(self, command: TapCommand, is_wanted: Callable[[], bool] = lambda: True) -> int:
         """Execute one tap; return the number of the cycle that it made.
@@ -73,7 +71,7 @@ class TapCommander:
             try:
                 async with asyncio.timeout(self._patience_s):
                     session, before = await self._read_positioning()
-                    if before.state != "ready":
+                    if before.state != READY:
                         raise PositioningError(
                             f"{self._module.cell}: module takes no command, it is {before.state}"
                         )
@@ -115,7 +113,7 @@ class TapCommander:
             async with asyncio.timeout(self._patience_s):
                 while True:
                     report = await self.read_report()
-                    if report.state == "ready":
+                    if report.state == READY:
                         return report
                     await asyncio.sleep(_POLL_S)
         except TimeoutError:
@@ -163,7 +161,7 @@ class TapCommander:
         """Write the parameters and read them back."""
         registers = self._module.registers
         parameters = dict(
-            zip(_PARAMETERS, (command.velocity_m_s, command.stroke_m, command.direction), strict=True)
+            zip(PARAMETERS, (command.velocity_m_s, command.stroke_m, command.direction), strict=True)
         )
         codes = {name: registers[name].encode(value) for name, value in parameters.items()}
         while True:
@@ -196,9 +194,9 @@ class TapCommander:
             if session_now != session:
                 raise PositioningError(f"{cell}: module was started anew during tap {sequence}")
             if positioning.accepted_command == sequence:
-                if positioning.result == "done":
+                if positioning.result == DONE:
                     return positioning.cycle
-                if positioning.result != "executing":
+                if positioning.result != EXECUTING:
                     raise PositioningError(f"{cell}: tap {sequence}: {positioning.result}")
             elif not written:
                 if not is_wanted():

@@ -14,6 +14,7 @@ from impactcell.errors import AccessError, JournalError
 from impactcell.features import noise_std
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.map_registers import unknown_names
+from impactcell.fieldbus.positioning_registers import not_placing
 from impactcell.journal.refusal import refusal
 from impactcell.journal.store import Journal
 from impactcell.prediction.mass_interpolation import velocity_range_m_s
@@ -247,6 +248,8 @@ def _of_map(cell: CellConfig) -> Iterator[_Remark]:
     registers = cell.register_map
     for text in (*unknown_names(registers.registers), *not_promised(registers)):
         yield _Remark(("module", "register_map"), f"{registers.name}: {text}", is_fault=False)
+    for text in not_placing(registers) if cell.settings.positioning is not None else ():
+        yield _Remark(("positioning",), f"register map {registers.name}: {text}")
     stroke_mm = cell.settings.actuator.stroke_mm
     for name, section, key, value, unit, scale in (
         ("mass", "part", "mass_kg", cell.settings.part.mass_kg, "kg", 1.0),

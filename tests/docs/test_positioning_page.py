@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from impactcell.fieldbus.status_block import _POSITIONING
-from impactcell.fieldbus.tap_commands import _PARAMETERS
+from impactcell.fieldbus.positioning_registers import COMMAND, SHOWN
 from impactcell.settings.positioning_section import PositioningSection
 from impactcell.settings.sections import ActuatorSection
 
@@ -43,7 +42,7 @@ def messages() -> Iterator[str]:
 
 def test_every_register_of_positioning_is_told() -> None:
     told = {name for row in rows("The handshake with the PLC") for name in re.findall(r"`(\w+)`", row[0])}
-    assert told == {*_POSITIONING, *_PARAMETERS, "command_sequence", "command_abort"}
+    assert told == {*SHOWN, *COMMAND, "command_abort"}
 
 
 def test_every_key_is_told_with_its_default() -> None:

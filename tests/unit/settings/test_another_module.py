@@ -132,6 +132,36 @@ def test_what_a_map_does_not_promise_and_what_nothing_uses_is_told(tmp_path: Pat
     )
 
 
+def _said_of_positioning(tmp_path: Path, content: dict[str, Any]) -> list[str]:
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(content))
+    path = cell_file(tmp_path, register_map=str(tmp_path / "map.yaml"))
+    cell = yaml.safe_load(path.read_text()) | {"positioning": {"travel_mm": 40.0}, "part": {"mass_kg": 18.9}}
+    path.write_text(yaml.safe_dump(cell))
+    return [str(found) for found in judge_cell(read_cell(path)) if found.section == "positioning"]
+
+
+def test_what_a_cell_that_places_parts_lacks_in_its_map_is_a_fault(tmp_path: Path) -> None:
+    content = yaml.safe_load(SHIPPED.read_text())
+    assert _said_of_positioning(tmp_path, content) == []
+    registers = content["registers"]
+    registers["positioning_state"]["codes"] = {1: "bereit", 2: "belegt"}
+    for name in ("target_sequence", "command_velocity", "command_abort"):
+        del registers[name]
+    state, missing = sorted(_said_of_positioning(tmp_path, content))
+    assert "map fpga-v1: no code of register positioning_state is called `ready`: every tap would" in state
+    assert "map fpga-v1: no registers target_sequence, command_velocity: no part can be placed" in missing
+    del registers["command_result"], registers["positioning_state"]
+    (missing,) = _said_of_positioning(tmp_path, content)
+    assert "no registers positioning_state, command_result, target_sequence, command_velocity: no" in missing
+
+
+def test_a_map_without_an_abort_is_told_where_parts_are_placed(tmp_path: Path) -> None:
+    content = yaml.safe_load(SHIPPED.read_text())
+    del content["registers"]["command_abort"]
+    (said,) = _said_of_positioning(tmp_path, content)
+    assert "no register command_abort: a tap that is executed cannot be aborted" in said
+
+
 def test_the_shipped_map_promises_all_and_has_no_name_that_nothing_uses() -> None:
     assert not_promised(read_register_map(SHIPPED)) == ()
     maps = [read_register_map(file) for file in SHIPPED.parent.glob("*.yaml")]

@@ -1,0 +1,34 @@
+"""What a register map has to have, and to call by name, for the module of a cell that places parts."""
+
+from collections.abc import Iterator
+from typing import Final
+
+from impactcell.fieldbus.registers import RegisterMap
+
+SHOWN: Final = (
+    "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
+    "command_accepted", "command_cycle",
+)  # fmt: skip
+"""Registers in which the module shows part, target and outcome; without one none of them is looked at."""
+PARAMETERS: Final = ("command_velocity", "command_stroke", "command_direction")
+"""Registers that a tap is written to; then `command_sequence` has it made."""
+COMMAND: Final = (*PARAMETERS, "command_sequence")
+READY: Final = "ready"
+"""Code of `positioning_state` of a module that takes a command."""
+EXECUTING, DONE = "executing", "done"
+"""Codes of `command_result`; every other name is a refusal, and is told."""
+_CODES: Final = {"positioning_state": (READY,), "command_result": (EXECUTING, DONE)}
+
+
+def not_placing(registers: RegisterMap) -> Iterator[str]:
+    """Say why a module of this map can place no part, a sentence each."""
+    missing = [name for name in (*SHOWN, *COMMAND) if name not in registers]
+    if missing:
+        yield f"no register{'s' if len(missing) > 1 else ''} {', '.join(missing)}: no part can be placed"
+    for name, wanted in _CODES.items():
+        codes = registers[name].codes if name in registers else dict(enumerate(wanted))
+        for word in wanted:
+            if word not in codes.values():
+                yield f"no code of register {name} is called `{word}`: every tap would be refused"
+    if not missing and "command_abort" not in registers:
+        yield "no register command_abort: a tap that is executed cannot be aborted"
