@@ -79,10 +79,24 @@ class MethodTable:
         self._audit.add_method(owner, method_id, audit_name)
 
 
+def comment_fault(text: str) -> str:
+    """Say why a text can be no comment; empty where it can.
+
+    What a client sends as Latin-1 comes out of the codec with half characters in it, which nothing can write.
+    """
+    if len(text) > MAX_COMMENT:
+        return f"a comment has at most {MAX_COMMENT} characters"
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return "a comment is text in UTF-8"
+    return ""
+
+
 def _comment_text(value: object, index: int) -> str:
     """Take a comment: an absent one leaves the last one standing (Part 9, 5.5.6)."""
     text = (value.Text or "") if isinstance(value, ua.LocalizedText) else ""
-    if len(text) > MAX_COMMENT:
+    if comment_fault(text):
         raise InvalidArgumentError(index, ua.StatusCodes.BadOutOfRange)
     return text
 

@@ -30,12 +30,12 @@ from impactcell.scada.conditions import MAX_SHELVE_S, Condition
 from impactcell.scada.german import GERMAN
 from impactcell.scada.interface import Actions, CellDescription, ConditionAction, HistorySource
 from impactcell.scada.methods import (
-    MAX_COMMENT,
     NAMES_EVENT,
     MethodTable,
     bind_cell,
     bind_condition,
     bind_refresh,
+    comment_fault,
 )
 from impactcell.scada.publishing import CellValues
 from impactcell.scada.rights import CONDITION_AREAS, Area, allowed
@@ -218,23 +218,23 @@ class Server:
         Raises
         ------
         RefusedError
-            The role may not, the comment is too long, or the state forbids it.
+            The role may not, the comment is too long or no text, or the state forbids it.
         """
         await audited(actor, f"{cell}: ResetWear({comment!r})", self._reset_wear(cell, comment, actor))
 
     async def _reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
         if not allowed(actor.role, Area.RESET_WEAR, Permission.CALL):
             raise RefusedError("BadUserAccessDenied")
-        if len(comment) > MAX_COMMENT:
-            raise RefusedError("BadOutOfRange", f"a comment has at most {MAX_COMMENT} characters")
+        if fault := comment_fault(comment):
+            raise RefusedError("BadOutOfRange", fault)
         await self._actions.reset_wear(cell, comment, actor)
 
     async def _act(self, cell: str, alarm: str, action: ConditionAction, actor: Actor) -> None:
         event, comment, shelve_s = action.event, action.comment, action.shelve_s
         if not allowed(actor.role, CONDITION_AREAS[event], Permission.CALL):
             raise RefusedError("BadUserAccessDenied")
-        if len(comment) > MAX_COMMENT:
-            raise RefusedError("BadOutOfRange", f"a comment has at most {MAX_COMMENT} characters")
+        if fault := comment_fault(comment):
+            raise RefusedError("BadOutOfRange", fault)
         if event is EventKind.SHELVE_TIMED and not 0.0 < shelve_s <= MAX_SHELVE_S:
             raise RefusedError("BadShelvingTimeOutOfRange")
         activation = None

@@ -170,7 +170,7 @@ class CellWorker:
 
     async def change_state(self, change_state: Callable[[CellState], CellState], audit: AuditEntry) -> None:
         """Change the state by a person's command, and write down who did it."""
-        await self.run(lambda: self._change_state(change_state, audit))
+        await self.run(lambda: self._record(change_state(self._state), (), audit))
 
     async def retry(self) -> None:
         """Try again to write what the journal could not take, also while no cycles come."""
@@ -179,7 +179,7 @@ class CellWorker:
 
     async def record(self, audit: AuditEntry | None = None) -> None:
         """Store the state now, with what a person did that is not in it."""
-        await self.run(lambda: self._record((), audit))
+        await self.run(lambda: self._record(self._state, (), audit))
 
     async def redesign(self, design: CellDesign) -> None:
         """Go on with other settings or another model, from the next cycle on."""
@@ -250,14 +250,15 @@ class CellWorker:
         faults: tuple[str, ...],
     ) -> CycleResult:
         step_result = self._step(capture, positioning, announcement, faults)
-        self.last = CycleId(capture.session, capture.cycle)
-        self._state, self._snapshot = step_result.state, step_result.snapshot
-        if self._journal_writer.journal is None:
-            return CycleResult(step_result, self.last)
-        blob, snapshot, changed = self._blob(), step_result.snapshot, step_result.changed
-        self._journal_writer.cycle(
-            self.last, lambda journal: journal.append(capture, snapshot, blob, changed)
-        )
+        state, snapshot = step_result.state, step_result.snapshot
+        last = CycleId(capture.session, capture.cycle)
+        is_kept = self._journal_writer.journal is not None
+        blob = self._blob(state, snapshot, last) if is_kept else b""
+        self.last, self._state, self._snapshot = last, state, snapshot
+        if not is_kept:
+            return CycleResult(step_result, last)
+        changed = step_result.changed
+        self._journal_writer.cycle(last, lambda journal: journal.append(capture, snapshot, blob, changed))
         return CycleResult(step_result, self.durable)
 
     def _maintain(self, time_ns: int) -> None:
@@ -266,34 +267,30 @@ class CellWorker:
         except Exception:
             self.log.exception("the journal could not be tidied")
 
-    def _blob(self) -> bytes:
-        stored = StoredState(self._state, self._snapshot, self.belief, self.last, self.handled_target)
+    def _blob(self, state: CellState, snapshot: Snapshot | None, last: CycleId | None) -> bytes:
+        stored = StoredState(state, snapshot, self.belief, last, self.handled_target)
         return pack_state(stored, self._unknown)
 
     def _apply_rule_result(self, rule_result: RuleResult, time_ns: int) -> None:
-        self._state, changed = core.apply_rule_result(self._design, self._state, rule_result, time_ns)
+        state, changed = core.apply_rule_result(self._design, self._state, rule_result, time_ns)
         if changed:
-            self._record(changed, None)
+            self._record(state, changed, None)
+        else:
+            self._state = state
 
     def _expire_shelving(self, time_ns: int) -> None:
-        self._state, changed = core.expire_shelving(self._state, time_ns)
+        state, changed = core.expire_shelving(self._state, time_ns)
         if changed:
-            self._record(changed, None)
+            self._record(state, changed, None)
 
     def _apply_event(self, name: str, event: AlarmEvent, audit: AuditEntry) -> Transition:
-        self._state, transition = core.apply_event(self._state, name, event)
-        result = "Good" if transition.refusal is None else transition.refusal.value
-        self._record((transition.alarm,) if transition.notifications else (), _with_result(audit, result))
+        state, transition = core.apply_event(self._state, name, event)
+        audit = replace(audit, result="Good" if transition.refusal is None else transition.refusal.value)
+        self._record(state, (transition.alarm,) if transition.notifications else (), audit)
         return transition
 
-    def _change_state(self, change_state: Callable[[CellState], CellState], audit: AuditEntry) -> None:
-        self._state = change_state(self._state)
-        self._record((), audit)
-
-    def _record(self, changed: tuple[Alarm, ...], audit: AuditEntry | None) -> None:
-        blob = self._blob()
+    def _record(self, state: CellState, changed: tuple[Alarm, ...], audit: AuditEntry | None) -> None:
+        """Take a state and store it; one that cannot be written is not taken, for no later one could be."""
+        blob = self._blob(state, self._snapshot, self.last)
+        self._state = state
         self._journal_writer.store(lambda journal: journal.record(blob, changed, audit))
-
-
-def _with_result(audit: AuditEntry, result: str) -> AuditEntry:
-    return replace(audit, result=result)

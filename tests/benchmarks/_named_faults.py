@@ -127,15 +127,15 @@ NAMED_FAULTS: Final = (
     NamedFault(
         "acknowledgements not in the journal's audit",
         "impactcell/service/worker.py",
-        "self._record((transition.alarm,) if transition.notifications else (), _with_result(audit, result))",
-        "self._record((transition.alarm,) if transition.notifications else (), None)",
+        "self._record(state, (transition.alarm,) if transition.notifications else (), audit)",
+        "self._record(state, (transition.alarm,) if transition.notifications else (), None)",
         ("tests/unit/service",),
     ),
     NamedFault(
         "commands not in the journal's audit",
         "impactcell/service/worker.py",
-        "        self._record((), audit)",
-        "        self._record((), None)",
+        "self._record(change_state(self._state), (), audit)",
+        "self._record(change_state(self._state), (), None)",
         ("tests/unit/service",),
     ),
     NamedFault(
@@ -155,8 +155,8 @@ NAMED_FAULTS: Final = (
     NamedFault(
         "what the planner has learned not stored",
         "impactcell/service/worker.py",
-        "StoredState(self._state, self._snapshot, self.belief, self.last)",
-        "StoredState(self._state, self._snapshot, None, self.last)",
+        "StoredState(state, snapshot, self.belief, last)",
+        "StoredState(state, snapshot, None, last)",
         ("tests/unit/service/test_planner_restart.py",),
     ),
     NamedFault(

@@ -48,13 +48,13 @@ async def listening(here: Site, client: Client) -> Events:
     return events
 
 
-async def act(here: Site, client: Client, method: str, event_id: bytes) -> int:
+async def act(here: Site, client: Client, method: str, event_id: bytes, comment: str = "seen") -> int:
     request = ua.CallMethodRequest(
         ObjectId=(await here.node(client, "WearLimit")).nodeid,
         MethodId=(await here.node(client, f"WearLimit/{method}")).nodeid,
         InputArguments=[
             ua.Variant(event_id, ua.VariantType.ByteString),
-            ua.Variant(ua.LocalizedText("seen")),
+            ua.Variant(ua.LocalizedText(comment)),
         ],
     )
     return (await client.uaclient.call([request]))[0].StatusCode.value
@@ -132,6 +132,28 @@ async def test_an_event_id_does_not_stand_for_another_activation() -> None:
         for old in (first, cleared, bytes(16), b"", again[:8], again + b"x"):
             assert await act(here, client, "Acknowledge", old) == codes.BadEventIdUnknown, old.hex()
         assert await act(here, client, "Acknowledge", again) == 0
+
+
+async def test_a_comment_that_is_no_utf_8_is_refused() -> None:
+    """What a client sends in Latin-1 came through with half characters, which the journal cannot write."""
+    latin = b"gr\xfc\xdfe".decode(errors="surrogateescape")  # the client sends these very bytes
+    async with site() as here, await here.client("engineer") as client:
+        events = await listening(here, client)
+        here.raise_alarm()
+        raised = (await events.next()).EventId
+        for method in ("AddComment", "Acknowledge", "Confirm"):
+            assert await act(here, client, method, raised, latin) == codes.BadInvalidArgument, method
+            assert here.actions.of(CELL, "WearLimit").comment == ""
+        reset = ua.CallMethodRequest(
+            ObjectId=(await here.node(client, "")).nodeid,
+            MethodId=(await here.node(client, "ResetWear")).nodeid,
+            InputArguments=[ua.Variant(ua.LocalizedText(latin))],
+        )
+        (result,) = await client.uaclient.call([reset])
+        assert result.StatusCode.value == codes.BadInvalidArgument
+        assert result.InputArgumentResults[0].value == codes.BadOutOfRange
+        assert here.actions.calls == []
+        assert await act(here, client, "Acknowledge", raised, "grüße") == 0
 
 
 @pytest.mark.parametrize("action", ["Acknowledge", "AddComment"])

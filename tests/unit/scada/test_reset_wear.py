@@ -1,12 +1,16 @@
-"""Resetting wear from elsewhere than OPC UA: the same right, bound and audit trail as the method has."""
+"""Acting from elsewhere than OPC UA: the same right, bound and audit trail as the methods have."""
 
 import logging
 
 import pytest
 
-from impactcell.scada import Actor, RefusedError, Role
+from impactcell.alarms import EventKind
+from impactcell.scada import Actor, ConditionAction, RefusedError, Role
 from impactcell.scada.methods import MAX_COMMENT
 from impactcell.scada.server import Server
+
+HALF = "gr\udcfc"
+"""A comment in Latin-1, as a decoder gives it that keeps what it cannot read."""
 
 
 class Actions:
@@ -32,9 +36,19 @@ async def test_wear_is_reset_by_whom_the_method_lets_and_is_written_down(
                     await server.reset_wear("press-1", "new plate", actor)
         with pytest.raises(RefusedError, match="characters"):
             await server.reset_wear("press-1", "x" * (MAX_COMMENT + 1), actor)
+        with pytest.raises(RefusedError, match="UTF-8"):
+            await server.reset_wear("press-1", HALF, actor)
     assert actions.done == [("press-1", "new plate", "ENGINEER")]
     outcomes = [record.getMessage() for record in caplog.records]
     assert (
         sum("press-1: ResetWear('new plate'): refused, BadUserAccessDenied" in said for said in outcomes) == 2
     )
     assert "ENGINEER (engineer) from 10.0.0.7: press-1: ResetWear('new plate'): done" in outcomes
+
+
+@pytest.mark.parametrize("event", [EventKind.ACKNOWLEDGE, EventKind.CONFIRM, EventKind.COMMENT])
+async def test_a_comment_that_nothing_can_write_reaches_no_alarm(event: EventKind) -> None:
+    server = Server.__new__(Server)  # nothing of it is asked
+    action, actor = ConditionAction(event, b"", HALF), Actor("anna", Role.ENGINEER, "10.0.0.7")
+    with pytest.raises(RefusedError, match="UTF-8"):
+        await server.act_on_condition("press-1", "WearLimit", action, actor)

@@ -12,11 +12,12 @@ import pytest
 
 from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, EventKind
+from impactcell.alarms.rules import module_connection
 from impactcell.errors import ForeignJournalError, JournalFullError
 from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
-from impactcell.records import Capture, Channel, CycleId, PositioningState, Quality, Shelving
+from impactcell.records import Alarm, Capture, Channel, CycleId, PositioningState, Quality, Shelving
 from impactcell.serialization.message_pack import pack_tree, unpack_tree
 from impactcell.service.factory import cell_design
 from impactcell.service.journal_writer import JournalWriter
@@ -299,6 +300,33 @@ async def test_shelving_ends_when_its_time_is_over(tmp_path: Path, design: core.
     await worker.expire_shelving(111)
     assert shelving() is Shelving.UNSHELVED
     await worker.close()
+
+
+@pytest.mark.parametrize("is_kept", [True, False])
+async def test_what_cannot_be_written_changes_nothing(
+    tmp_path: Path, design: core.CellDesign, *, is_kept: bool
+) -> None:
+    """One comment in Latin-1, and the cell took in no cycle any more until the service began anew."""
+    worker = CellWorker(design, Journal(tmp_path / "j", "c") if is_kept else None, Retention())
+    told: list[tuple[Alarm, ...]] = []
+    worker.tell_alarms(told.append)
+    before, audit = worker.alarms, AuditEntry(10, "anna", "comment", "{}", "Good")
+    half = AlarmEvent(EventKind.COMMENT, time_ns=10, user="anna", comment="gr\udcfc")
+    with pytest.raises(UnicodeEncodeError):
+        await worker.apply_event("WearLimit", half, audit)
+    with pytest.raises(UnicodeEncodeError):
+        await worker.change_state(lambda state: core.start_batch(state, "B\udcfc", expected=True), audit)
+    lost = module_connection.result("gr\udcfc", connected=False)
+    with pytest.raises(UnicodeEncodeError):
+        await worker.apply_rule_result(lost, 10)
+    await asyncio.sleep(0)
+    assert worker.alarms == before
+    assert not told
+    assert await process(worker, make_capture(1)) == CycleId(1, 1)
+    assert worker.journal_fault == ""
+    await worker.close()
+    if is_kept:
+        assert cycles(tmp_path / "j") == [1]
 
 
 async def test_the_time_between_cycles_is_known_from_the_second_on(
