@@ -101,7 +101,9 @@ def update(
     *,
     announced: bool = False,
 ) -> tuple[AlarmSetState, tuple[Transition, ...]]:
-    """Move all alarms by what the rules say of one cycle, and by its time.
+    """Move all alarms by what the rules say of one cycle.
+
+    Its time ends no shelving: that is of the module's clock, and people shelve by ours (`expire_shelving`).
 
     Parameters
     ----------
@@ -114,9 +116,7 @@ def update(
     transitions : tuple of Transition
         Those that have notifications.
     """
-    state, transitions = expire_shelving(state, cycle, time_ns)
-    state, suppressions = _suppress(settings, state, cycle, time_ns, announced=announced)
-    transitions = (*transitions, *suppressions)
+    state, transitions = _suppress(settings, state, cycle, time_ns, announced=announced)
     for result in _explained(state, tuple(results)):
         index = _INDEX[result.name]
         # nearly always there is nothing to do
@@ -196,7 +196,7 @@ def apply_event(state: AlarmSetState, name: str, event: AlarmEvent) -> tuple[Ala
 def expire_shelving(
     state: AlarmSetState, cycle: int, time_ns: int
 ) -> tuple[AlarmSetState, tuple[Transition, ...]]:
-    """End every shelving whose time is over."""
+    """End every shelving whose time is over by the clock that it was shelved by."""
     if all(alarm.shelving is Shelving.UNSHELVED for alarm in state.alarms):
         return state, ()
     changes = [expire(alarm, cycle, time_ns) for alarm in state.alarms]

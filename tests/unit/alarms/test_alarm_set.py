@@ -280,16 +280,24 @@ def test_an_announced_batch_keeps_the_batch_alarm_silent():
     assert not state.alarm(BATCH).suppressed
 
 
-def test_shelving_ends_with_time_as_the_cycles_bring_it():
+def test_shelving_ends_by_the_clock_it_was_shelved_by_and_not_by_that_of_the_cycles():
+    """A module whose clock was two hours ahead ended a shelving of one hour with its next cycle."""
     settings = AlarmSettings(rules={WEAR: RuleSettings()})
     state = alarms.initial_state(settings)
-    shelve = AlarmEvent(EventKind.SHELVE_TIMED, 0, 0, user="ann", shelve_ns=5 * SECOND)
+    shelve = AlarmEvent(EventKind.SHELVE_TIMED, 0, 0, user="ann", shelve_ns=3600 * SECOND)
     state, done = alarms.apply_event(state, WEAR, shelve)
     assert done.refusal is None
-    state, events = run(settings, state, WEAR, [False, True, True, True, True, True])
-    assert events == [(1, True, False), (5, True, False)]
-    assert state.alarm(WEAR).shelving is Shelving.UNSHELVED
-    again, moved = alarms.expire_shelving(state, 6, 99 * SECOND)
+    told = []
+    for cycle, held in enumerate([False, True, True], 1):
+        result = RuleResult(WEAR, held)
+        state, moved = alarms.update(settings, state, [result], cycle, (7200 + cycle) * SECOND)
+        told += [(cycle, t.alarm.active, alarms.Notification.ANNUNCIATE in t.notifications) for t in moved]
+    assert told == [(2, True, False)]
+    assert state.alarm(WEAR).shelving is Shelving.TIMED
+    assert alarms.expire_shelving(state, 3, 3599 * SECOND) == (state, ())
+    state, (over,) = alarms.expire_shelving(state, 3, 3600 * SECOND)
+    assert over.alarm.shelving is Shelving.UNSHELVED
+    again, moved = alarms.expire_shelving(state, 6, 9999 * SECOND)
     assert again == state
     assert moved == ()
 
