@@ -5,8 +5,15 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from impactcell.alarms.debounce import ZERO_COUNTS, DebounceCounters, debounce, is_news
-from impactcell.alarms.lifecycle import AlarmEvent, EventKind, Transition, expire, transition
+from impactcell.alarms.debounce import ZERO_COUNTS, DebounceCounters, debounce, has_moved, is_news
+from impactcell.alarms.lifecycle import (
+    AlarmEvent,
+    EventKind,
+    Notification,
+    Transition,
+    expire,
+    transition,
+)
 from impactcell.alarms.rule import CycleInputs, RuleContext, RuleResult, RuleSettings
 from impactcell.alarms.rules import RULES
 from impactcell.records import Alarm, Evidence, Shelving
@@ -167,21 +174,32 @@ def apply_rule_result(
         result = before.held_back
     if counters is not state.counters[index]:
         state = AlarmSetState(state.alarms, _with(state.counters, index, counters), state.suppressed_cycles)
+    if kind is None and alarm.active and result.holds and is_news(rule, alarm, result):
+        if not RULES[result.name].calls_again:
+            change = _retold(alarm, result, cycle, time_ns)
+            return replace(state, alarms=_with(state.alarms, index, change.alarm)), change
+        state, _ = apply_event(state, result.name, AlarmEvent(EventKind.CLEAR, cycle, time_ns))
+        kind = EventKind.ACTIVATE
     if kind is None:
-        if alarm.active and result.holds and is_news(rule, alarm.evidence, result.evidence):
-            message = result.message
-            renewed = replace(
-                alarm,
-                message=message.english or alarm.message,
-                message_de=message.german or alarm.message_de,
-                evidence=result.evidence,
-            )
-            state = replace(state, alarms=_with(state.alarms, index, renewed))
-        return state, Transition(state.alarms[index])
+        return state, Transition(alarm)
     event = AlarmEvent(kind, cycle, time_ns)
     if result.holds:
         event = replace(event, message=result.message, severity=rule.severity, evidence=result.evidence)
     return apply_event(state, result.name, event)
+
+
+def _retold(alarm: Alarm, result: RuleResult, cycle: int, time_ns: int) -> Transition:
+    """Let an active alarm tell what has changed; where no figure has, its message alone makes it an event."""
+    message = result.message
+    renewed = replace(
+        alarm,
+        message=message.english or alarm.message,
+        message_de=message.german or alarm.message_de,
+        evidence=result.evidence,
+    )
+    if has_moved(alarm.evidence, result.evidence):
+        return Transition(renewed)
+    return Transition(replace(renewed, cycle=cycle, time_ns=time_ns), (Notification.EVENT,))
 
 
 def apply_event(state: AlarmSetState, name: str, event: AlarmEvent) -> tuple[AlarmSetState, Transition]:

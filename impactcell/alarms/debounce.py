@@ -1,6 +1,7 @@
 """From what a rule says to what happens to its alarm: delays counted in cycles, and re-alarm (ISA-18.2)."""
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import astuple, dataclass, replace
 
 from impactcell.alarms.lifecycle import EventKind
 from impactcell.alarms.rule import RuleResult, RuleSettings
@@ -65,8 +66,18 @@ def debounce(
     return DebounceCounters(0, missed, called), None
 
 
-def is_news(settings: RuleSettings, told: Evidence, now: Evidence) -> bool:
-    """Whether evidence has changed by the agreed step since it was told."""
-    if now == told or settings.told_step == 0.0:
-        return now != told
-    return abs(now.size - told.size) >= settings.told_step * now.size_std
+def is_news(settings: RuleSettings, told: Alarm, now: RuleResult) -> bool:
+    """Whether what a rule says has changed by the agreed step since its alarm told it.
+
+    Where every change is told, another message is one too, though no figure has moved.
+    """
+    if has_moved(told.evidence, now.evidence):
+        step = settings.told_step * now.evidence.size_std
+        return settings.told_step == 0.0 or abs(now.evidence.size - told.evidence.size) >= step
+    return settings.told_step == 0.0 and now.message.english not in ("", told.message)
+
+
+def has_moved(before: Evidence, after: Evidence) -> bool:
+    """Whether any figure differs; two that are not there do not, though one is from a journal."""
+    pairs = zip(astuple(before), astuple(after), strict=True)
+    return any(a != b and not (math.isnan(a) and math.isnan(b)) for a, b in pairs)

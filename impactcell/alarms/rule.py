@@ -79,8 +79,8 @@ class RuleSettings:
         Hysteresis of the rule's statistic; nan for a rule that has a threshold of its own.
     told_step : float
         While the alarm is active, evidence is told anew once its size has changed by so many of its standard
-        deviations, and not where it has no size; 0 tells every change, as of a rule whose every result is an
-        occurrence of its own.
+        deviations, and not where it has no size; 0 tells every change, of its message too, as of a rule whose
+        every result is an occurrence of its own.
     """
 
     severity: int = 500
@@ -210,6 +210,9 @@ class AlarmRule:
         Rules by name that explain this one only where they begin to hold while it is held back.
     logged_by_cause : bool
         What raises it has logged it already.
+    calls_again : bool
+        What is told anew while it is active is another occurrence, as the fault of another task: it calls for
+        attention, whether or not the one before was acknowledged.
     is_probability : bool
         Its statistic and threshold are probabilities, which people read in per cent.
     """
@@ -228,4 +231,5 @@ class AlarmRule:
     explained_at_once_by: tuple[str, ...] = ()
     may_be_explained_by: tuple[str, ...] = ()
     logged_by_cause: bool = False
+    calls_again: bool = False
     is_probability: bool = False

@@ -22,11 +22,13 @@ class _Condition:
     count: int = 1
 
 
-class ConditionLog:
-    """Logs what holds in a cell from cycle to cycle.
+def kind_of(note: str) -> str:
+    """Name the condition that is noted: two notes that differ in their numbers only are of the same one."""
+    return _PLURAL.sub("cycle", _NUMBER.sub("#", note))
 
-    Two notes that differ in their numbers only are the same condition.
-    """
+
+class ConditionLog:
+    """Logs what holds in a cell from cycle to cycle."""
 
     def __init__(self, log: CellLogger) -> None:
         self._log = log
@@ -35,7 +37,7 @@ class ConditionLog:
     def update(self, notes: Iterable[str], cycle: int) -> None:
         """Take what was noted of a cycle."""
         for note in notes:
-            kind = _PLURAL.sub("cycle", _NUMBER.sub("#", note))
+            kind = kind_of(note)
             known = self._lasting.get(kind)
             if known is None:
                 self._log.log(logging.INFO, "%s", note, cycle=cycle)

@@ -52,7 +52,8 @@ class Alarm:
     severity : int
         1-1000, as in OPC UA.
     message, message_de : str
-        Of the last activation, for a shift worker: English and German; empty before the first.
+        Of the last activation, and of what has changed since, for a shift worker: English and German; empty
+        before the first.
     cycle, time_ns : int
         Cycle and time of the last transition.
     activation : int

@@ -8,8 +8,7 @@ from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from functools import partial
 
-from impactcell.alarms import RuleResult
-from impactcell.alarms.rules import journal_fault, module_connection, positioning_fault
+from impactcell.alarms.rules import positioning_fault
 from impactcell.errors import ImpactCellError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
 from impactcell.fieldbus.map_promises import not_promised
@@ -29,6 +28,7 @@ from impactcell.records import (
 from impactcell.records.uncertainty import plus_minus
 from impactcell.scada import Server
 from impactcell.service.factory import cell_design, module_link
+from impactcell.service.fault_alarms import FaultAlarms
 from impactcell.service.monitoring import CellHealth
 from impactcell.service.opening import opened_worker
 from impactcell.service.positioning import PositioningTask
@@ -73,6 +73,7 @@ class CellTask:
         self.worker = opened_worker(cell)
         self._publisher = CellPublisher(cell.name, self.worker.alarms, self._positioning_state, self.log)
         self._conditions = ConditionLog(self.log)
+        self._fault_alarms = FaultAlarms(self.worker, self.log)
         self._on_snapshot = on_snapshot
         self._link_changes: asyncio.Queue[ModuleStatus] = asyncio.Queue()
         self._module = ModuleAcquisition(
@@ -222,7 +223,7 @@ class CellTask:
         )  # fmt: skip
         if result.durable is not None:
             await self._module.acknowledge(result.durable)
-        await self._check_journal()
+        await self._fault_alarms.check_journal()
         if self._on_snapshot is not None:
             self._on_snapshot(self.cell.name, snapshot)
 
@@ -239,7 +240,7 @@ class CellTask:
                 self._publisher.publish_positioning(self.worker.snapshot)
             fault = task.fault
             reason, evidence = fault or ("", Evidence())
-            await self._apply_rule_result(positioning_fault.result(reason, evidence))
+            await self.worker.apply_rule_result(positioning_fault.result(reason, evidence), time.time_ns())
 
     def _announcement(self) -> BatchAnnouncement | None:
         status_block = self._module.status_block
@@ -254,32 +255,21 @@ class CellTask:
         while True:
             status = await self._link_changes.get()
             self._publisher.publish_link(self._with_losses(status))
-            await self._apply_rule_result(module_connection.result(status.reason, connected=status.connected))
-
-    async def _check_journal(self) -> None:
-        for event in self.worker.take_journal_events():  # a person has to know, also where it is over
-            await self._apply_rule_result(journal_fault.result(event))
-        fault = self.worker.journal_fault
-        active = any(a.active for a in self.worker.alarms if a.name == journal_fault.NAME)
-        if bool(fault) != active:
-            if fault:
-                self.log.error("%s", fault)
-            await self._apply_rule_result(journal_fault.result(fault))
-
-    async def _apply_rule_result(self, rule_result: RuleResult) -> None:
-        await self.worker.apply_rule_result(rule_result, time.time_ns())
+            await self._fault_alarms.tell_link(status)
 
     async def _tick(self) -> None:
         while True:
             await asyncio.sleep(TICK_S)
             await self.worker.expire_shelving(time.time_ns())
+            if (status := self._module.status).reason:
+                await self._fault_alarms.tell_link(status)
             silent_s = time.monotonic() - self._last_cycle_s
             late = silent_s > max(STALE_AT_LEAST_S, STALE_PERIODS * self.worker.period_s)
             if late and not self._stale and self._module.status.connected:
                 self._stale = True
                 self._publisher.mark_stale(time.time_ns())
             await self.worker.retry()
-            await self._check_journal()
+            await self._fault_alarms.check_journal()
             if model_time_ns(self.cell) not in (0, self._model_seen_ns):
                 await self.reload()
 

@@ -18,6 +18,7 @@ from impactcell.alarms import (
     apply_rule_result,
     initial_state,
 )
+from impactcell.alarms.rules import module_connection, positioning_fault
 from impactcell.records import Alarm, Evidence
 from tests.opcua_server import CELL, Site, site
 from tests.patience import PATIENCE_S
@@ -132,6 +133,39 @@ async def test_an_event_id_does_not_stand_for_another_activation() -> None:
         for old in (first, cleared, bytes(16), b"", again[:8], again + b"x"):
             assert await act(here, client, "Acknowledge", old) == codes.BadEventIdUnknown, old.hex()
         assert await act(here, client, "Acknowledge", again) == 0
+
+
+async def test_another_reason_of_a_standing_alarm_is_an_event_and_the_next_fault_calls() -> None:
+    """A changed message without figures was told to nobody."""
+    settings = AlarmSettings()
+    state = initial_state(settings)
+    async with site() as here, await here.client("operator") as client:
+        events = await listening(here, client)
+
+        async def told(result: RuleResult, number: int) -> object:
+            nonlocal state
+            state = apply_rule_result(settings, state, result, 0, number * 10**9)[0]
+            here.server.alarm(CELL, state.alarm(result.name))
+            return await events.next()
+
+        async def acknowledged(name: str) -> None:
+            nonlocal state
+            state = apply_event(state, name, AlarmEvent(EventKind.ACKNOWLEDGE, 0, 2 * 10**9))[0]
+            here.server.alarm(CELL, state.alarm(name))
+            assert (await events.next()).AckedState.Text == "Acknowledged"
+
+        await told(module_connection.result("p: connection lost", connected=False), 1)
+        await acknowledged("ModuleConnection")
+        link = await told(module_connection.result("p: not connected", connected=False), 3)
+        assert "not connected" in link.Message.Text
+        assert link.AckedState.Text == "Acknowledged"
+        first = await told(positioning_fault.result("p: the target is refused"), 1)
+        await acknowledged("PositioningFault")
+        task = await told(positioning_fault.result("p: the mass is not known"), 3)
+        assert "mass is not known" in task.Message.Text
+        assert task.AckedState.Text == "Unacknowledged"
+        assert task.EventId[:8] != first.EventId[:8], "what stands for one fault stands for the next"
+        assert events.queue.empty()
 
 
 async def test_a_comment_that_is_no_utf_8_is_refused() -> None:

@@ -29,5 +29,6 @@ RULE = AlarmRule(
     ),
     settings=RuleSettings(severity=600, told_step=0.0),
     input_node="Positioning/Remaining",
+    calls_again=True,  # of the next task
 )
 """The rule."""

@@ -8,7 +8,7 @@ import pytest
 
 from impactcell import alarms
 from impactcell.alarms import AlarmEvent, AlarmSettings, CycleInputs, EventKind, RuleResult, RuleSettings
-from impactcell.alarms.rules import module_connection
+from impactcell.alarms.rules import module_connection, positioning_fault
 from impactcell.records import (
     BatchState,
     Evidence,
@@ -338,6 +338,7 @@ def test_the_state_is_restored_bit_for_bit():
 
 
 DEVIANT, GAP = "DeviantCycle", "ModelGap"
+LINK, TASK = "ModuleConnection", "PositioningFault"
 
 
 def feed(state, *results, cycle):
@@ -478,3 +479,75 @@ def test_a_residual_that_exceeds_speaks_before_the_taps():
     gap = Evidence(statistic=5.0, threshold=4.0, size=1.5, change_cycle=7)
     inputs = CycleInputs(40, wear(0.0), gap=gap, gap_exceeds=True, predictions=predictions(lacking=True))
     assert judge(SETTINGS, NORMAL, inputs, GAP).evidence.change_cycle == 7
+
+
+def beside(state, result, time_ns):
+    return alarms.apply_rule_result(SETTINGS, state, result, 0, time_ns)
+
+
+def acknowledged(state, name, activation=None):
+    event = AlarmEvent(EventKind.ACKNOWLEDGE, 0, 50, user="ann", comment="seen", activation=activation)
+    return alarms.apply_event(state, name, event)
+
+
+def test_another_reason_of_a_lost_link_is_told_and_leaves_its_acknowledgement():
+    """It said "no connection, check the cable" for as long as it stood, whatever answered meanwhile."""
+    lost = module_connection.result("press-1: 10.0.0.9:502 device 1: connection lost", connected=False)
+    other = module_connection.result("press-1: 10.0.0.9:502 device 1: not connected", connected=False)
+    state, _ = beside(NORMAL, lost, 5)
+    state, _ = acknowledged(state, LINK)
+    before = state.alarm(LINK)
+    for state_now in (state, unpack(alarms.AlarmSetState, pack(state))):  # restored: its nan is another one
+        same, done = beside(state_now, lost, 6)
+        assert (same.alarm(LINK).time_ns, done.notifications) == (50, ())
+    state, done = beside(state, other, 7)
+    assert done.notifications == (alarms.Notification.EVENT,)
+    assert done.alarm is state.alarm(LINK)
+    assert done.alarm == replace(
+        before, message=other.message.english, message_de=other.message.german, time_ns=7
+    )
+    assert "nicht verbunden" in done.alarm.message_de
+    assert beside(state, other, 8)[1].notifications == ()
+
+
+def test_the_fault_of_another_task_calls_again_and_is_not_acknowledged_unseen():
+    """A second target was refused, and its alarm stood acknowledged, with the reason of the first."""
+    first, second = (
+        positioning_fault.result(f"press-1: {why}")
+        for why in (
+            "target 500.000 mm is beyond the travel of 0 to 40 mm",
+            "the mass of the part is not known",
+        )
+    )
+    state, raised = beside(NORMAL, first, 5)
+    state, _ = acknowledged(state, TASK)
+    for state_now in (state, unpack(alarms.AlarmSetState, pack(state))):
+        same, done = beside(state_now, first, 60)
+        assert same.alarm(TASK).acknowledged, "the same refusal calls again"
+        assert done.notifications == ()
+    state, again = beside(state, second, 61)
+    assert again.notifications == (alarms.Notification.EVENT, alarms.Notification.ANNUNCIATE)
+    assert again.alarm is state.alarm(TASK)
+    assert (again.alarm.active, again.alarm.acknowledged) == (True, False)
+    assert "mass of the part" in again.alarm.message
+    state, third = beside(state, first, 62)
+    assert raised.alarm.activation < again.alarm.activation < third.alarm.activation
+    assert acknowledged(state, TASK, again.alarm.activation)[1].refusal is alarms.Refusal.ANOTHER_ACTIVATION
+    assert acknowledged(state, TASK, third.alarm.activation)[1].refusal is None
+
+
+def test_a_fault_with_figures_calls_again_where_they_are_others():
+    figures = Evidence(4.0, 3.29, 0, 0.001, 0.0002)
+    state, _ = beside(NORMAL, positioning_fault.result("press-1: tap 3 moved nothing", figures), 5)
+    state, _ = acknowledged(state, TASK)
+    state, done = beside(state, positioning_fault.result("press-1: tap 3 moved nothing"), 60)
+    assert (done.alarm.acknowledged, done.alarm.evidence) == (False, Evidence())
+
+
+def test_a_shelved_alarm_tells_the_fault_of_another_task_without_a_call():
+    state, _ = beside(NORMAL, positioning_fault.result("press-1: tap 3 moved nothing"), 5)
+    shelve = AlarmEvent(EventKind.SHELVE_TIMED, 0, 6, user="ann", shelve_ns=3600 * SECOND)
+    state, _ = alarms.apply_event(state, TASK, shelve)
+    state, done = beside(state, positioning_fault.result("press-1: tap 4 moved nothing"), 7)
+    assert done.notifications == (alarms.Notification.EVENT,)
+    assert state.alarm(TASK).shelving is Shelving.TIMED

@@ -1,0 +1,166 @@
+"""Alarms beside the cycles tell what is wrong now: another fault too, and none that only comes and goes."""
+
+import asyncio
+import contextlib
+import time
+from collections.abc import AsyncIterator, Awaitable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from impactcell.alarms import AlarmEvent, EventKind
+from impactcell.alarms.rules import journal_fault, module_connection, positioning_fault
+from impactcell.journal.audit_entries import AuditEntry
+from impactcell.journal.history import HistoryQuery
+from impactcell.journal.store import Journal
+from impactcell.positioning.task_state_machine import TaskPhase, TaskState
+from impactcell.records import Alarm, Evidence
+from impactcell.service.cell_task import CellTask
+from impactcell.service.fault_alarms import STANDS_S, FaultAlarms, SettledReason
+from impactcell.settings import read_cell
+from impactcell.settings.sections import JournalSection
+from tests.integration.processes import CONFIG
+from tests.patience import PATIENCE_S
+
+SILENT = "press-1: 10.0.0.9:502 device 1: no connection within 0.5 s"
+NO_ROUTE = "press-1: 10.0.0.9:502 device 1: no connection: No route to host"
+STRANGER = "press-1: 10.0.0.9:502 device 1: register magic (0) shows 7, map prototype expects 18753"
+ANOTHER = STRANGER.replace("shows 7", "shows 8")
+
+
+def told(reasons: list[tuple[float, str]]) -> list[str]:
+    settled = SettledReason()
+    return [settled.update(reason, time_s) for time_s, reason in reasons]
+
+
+def test_another_reason_is_told_once_it_has_stood() -> None:
+    late = STANDS_S + 1.0
+    assert told([(0.0, SILENT), (1.0, STRANGER), (late - 0.1, STRANGER), (late, STRANGER)]) == [
+        *(SILENT, SILENT, SILENT, STRANGER),
+    ]
+    assert told([(0.0, SILENT), (1.0, STRANGER), (2.0, ANOTHER), (late, ANOTHER)])[-1] == STRANGER
+    assert told([(0.0, SILENT), (1.0, ""), (1.1, STRANGER)]) == [SILENT, "", STRANGER]
+
+
+def test_reasons_that_take_turns_are_told_once() -> None:
+    """A module that is switched off has no route to it at one attempt, and is silent at the next."""
+    turns = [(0.5 * attempt, (SILENT, NO_ROUTE)[attempt % 2]) for attempt in range(1000)]
+    assert set(told(turns)) == {SILENT}
+
+
+def test_one_that_differs_in_its_numbers_alone_is_the_same() -> None:
+    counted = [(float(n), f"press-1: an answer to transaction {n}, which is not open") for n in range(1000)]
+    assert len(set(told(counted))) == 1
+
+
+@pytest.fixture(params=[True])
+async def task(tmp_path: Path, request: pytest.FixtureRequest) -> AsyncIterator[CellTask]:
+    """A cell that positions, with a journal or without; its module is never asked."""
+    cell = read_cell(CONFIG / "cells" / "positioning.yaml")
+    journal = JournalSection(file=tmp_path / "j") if request.param else None
+    settings = cell.settings.model_copy(update={"journal": journal})
+    made = CellTask(replace(cell, settings=settings))
+    yield made
+    await made.close()
+
+
+def alarm(task: CellTask, name: str) -> Alarm:
+    return next(alarm for alarm in task.worker.alarms if alarm.name == name)
+
+
+async def acknowledge(task: CellTask, name: str) -> None:
+    now_ns = time.time_ns()
+    event = AlarmEvent(EventKind.ACKNOWLEDGE, time_ns=now_ns, user="anna")
+    done = await task.worker.apply_event(name, event, AuditEntry(now_ns, "anna", "Acknowledge", "{}", "Good"))
+    assert done.refusal is None
+
+
+@contextlib.asynccontextmanager
+async def beside(work: Awaitable[None]) -> AsyncIterator[None]:
+    running = asyncio.ensure_future(work)
+    try:
+        yield
+    finally:
+        running.cancel()
+        with contextlib.suppress(asyncio.CancelledError):
+            await running
+
+
+async def says(task: CellTask, name: str, words: str) -> Alarm:
+    async with asyncio.timeout(PATIENCE_S):
+        while words not in alarm(task, name).message:
+            await asyncio.sleep(0.01)
+    return alarm(task, name)
+
+
+async def transitions(task: CellTask, tmp_path: Path, name: str) -> list[Alarm]:
+    await task.worker.run(lambda: None)
+    with Journal(tmp_path / "j", None, read_only=True) as journal:
+        return [a for a in journal.alarms(HistoryQuery()).entries if a.name == name]
+
+
+async def test_the_next_target_that_is_refused_calls_again(task: CellTask, tmp_path: Path) -> None:
+    """The alarm stood acknowledged, with what was wrong with the target before."""
+    name, positioning = positioning_fault.NAME, task._positioning
+    assert positioning is not None
+
+    def refuse(reason: str) -> None:
+        positioning._set_sequence(TaskState(TaskPhase.FAULTED, reason=reason, evidence=Evidence()))
+
+    async with beside(task._publish_positioning()):
+        refuse("press-1: target 500.000 mm is beyond the travel of 0 to 40 mm")
+        await says(task, name, "500.000 mm is beyond")
+        await acknowledge(task, name)
+        refuse("press-1: the mass of the part is not known")
+        again = await says(task, name, "mass of the part")
+    assert (again.active, again.acknowledged) == (True, False)
+    assert [a.acknowledged for a in await transitions(task, tmp_path, name)] == [False, True, False]
+
+
+async def test_a_lost_link_tells_why_it_is_lost_now(
+    task: CellTask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was to check the cable, while a module of another kind answered."""
+    monkeypatch.setattr("impactcell.service.fault_alarms.STANDS_S", 0.0)
+    monkeypatch.setattr("impactcell.service.cell_task.TICK_S", 0.01)
+    name = module_connection.NAME
+    async with beside(task._publish_link()), beside(task._tick()):
+        task._module._report_link(connected=False, reason=SILENT)
+        await says(task, name, "no connection within 0.5 s")
+        await acknowledge(task, name)
+        task._module._report_link(connected=False, reason=STRANGER)
+        now = await says(task, name, "map prototype expects 18753")
+        assert (now.active, now.acknowledged) == (True, True)
+        assert "die Karte prototype erwartet 18753" in now.message_de
+        for attempt in range(100):  # which of them stands cannot be seen, and nothing is told of numbers
+            reason = STRANGER.replace("shows 7", f"shows {attempt}")
+            task._module._report_link(connected=False, reason=reason)
+            await asyncio.sleep(0)
+        task._module._report_link(connected=True, reason="")
+        async with asyncio.timeout(PATIENCE_S):
+            while alarm(task, name).active:
+                await asyncio.sleep(0.01)
+    assert len(await transitions(task, tmp_path, name)) == 4
+
+
+@pytest.mark.parametrize("task", [False], indirect=True)
+async def test_a_journal_tells_what_has_happened_to_it_since(
+    task: CellTask, caplog: pytest.LogCaptureFixture
+) -> None:
+    faults, name = FaultAlarms(task.worker, task.log), journal_fault.NAME
+    writer = task.worker._journal_writer
+    for fault, events, words in (
+        ("/j: the disk is full", [], "the disk is full"),
+        ("/j: the disk is full", ["/j: is gone"], "the disk is full"),
+        ("/j: not stored, 3 of 7", [], "3 of 7"),
+        ("/j: not stored, 4 of 7", [], "3 of 7"),
+    ):
+        writer.fault, writer._events = fault, events
+        await faults.check_journal()
+        assert words in alarm(task, name).message
+    assert alarm(task, name).active
+    writer.fault = ""
+    await faults.check_journal()
+    assert not alarm(task, name).active
+    assert len([r for r in caplog.records if "disk is full" in r.getMessage()]) == 2
