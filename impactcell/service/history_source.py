@@ -24,6 +24,9 @@ VALUES_AT_ONCE: Final = 250
 """Values in a page: 4 ms of reading."""
 ALARMS_AT_ONCE: Final = 25
 """Transitions in a page: 2 ms to make them records again, in this process."""
+FIRST_NS, LAST_NS = -(2**63), 2**63 - 1
+"""Times that a journal can hold, years 1677 to 2262. Clients ask for more: the greatest DateTime, of 9999,
+stands for an end that is open."""
 
 
 class JournalHistory:
@@ -97,5 +100,8 @@ class JournalHistory:
 
 
 def _query(request: HistoryRequest, at_once: int) -> HistoryQuery:
-    limit = min(request.limit, at_once)
-    return HistoryQuery(request.start_ns, request.end_ns, limit, request.newest_first, request.resume)
+    start_ns, end_ns = (
+        None if time_ns is None else min(max(time_ns, FIRST_NS), LAST_NS)
+        for time_ns in (request.start_ns, request.end_ns)
+    )
+    return HistoryQuery(start_ns, end_ns, min(request.limit, at_once), request.newest_first, request.resume)

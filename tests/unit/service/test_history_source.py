@@ -5,12 +5,14 @@ import os
 import signal
 from collections.abc import AsyncIterator
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
 from impactcell.journal.store import Journal
+from impactcell.opcua.historical_variable import parse_read_range
 from impactcell.records import Alarm, Quality
 from impactcell.scada import HistoryRequest, RefusedError
 from impactcell.service.history_source import ALARMS_AT_ONCE, VALUES_AT_ONCE, JournalHistory
@@ -58,12 +60,35 @@ async def test_pages_are_small_and_join_to_the_whole(history: JournalHistory) ->
     assert times == list(range(2, COUNT))
 
 
+def new_year(year: int) -> datetime:
+    return datetime(year, 1, 1, tzinfo=UTC)
+
+
 async def test_alarms(history: JournalHistory) -> None:
     page = await history.alarms(CELL, HistoryRequest(None, None, 1000, newest_first=True))
     assert [alarm.cycle for alarm in page.alarms] == list(range(ALARMS_AT_ONCE + 3, 3, -1))
     rest = await history.alarms(CELL, HistoryRequest(None, None, 1000, newest_first=True, resume=page.resume))
     assert [alarm.cycle for alarm in rest.alarms] == [3, 2, 1]
     assert rest.resume is None
+
+
+@pytest.mark.parametrize("late", [datetime.max.replace(tzinfo=UTC), *map(new_year, (2263, 2400, 2600))])
+@pytest.mark.parametrize("early", [new_year(1602), new_year(1970)])
+async def test_an_end_beyond_what_a_journal_can_hold_is_open(
+    history: JournalHistory, early: datetime, late: datetime
+) -> None:
+    """DateTime.MaxValue as the end was an internal error; after 2262 the journal was said to be unusable."""
+    for start, end, newest_first in ((early, late, False), (late, early, True)):
+        wanted = parse_read_range(start, end, 3)
+        assert wanted.newest_first is newest_first
+        page = await history.values(CELL, VARIABLE, wanted.request(3))
+        times = [value.time_ns for value in page.values]
+        assert times == ([COUNT, COUNT - 1, COUNT - 2] if newest_first else [1, 2, 3])
+        assert (await history.alarms(CELL, wanted.request(3))).alarms
+    assert not (await history.values(CELL, VARIABLE, parse_read_range(late, None, 3).request(3))).values
+    assert (await history.values(CELL, VARIABLE, parse_read_range(None, late, 3).request(3))).values
+    both = parse_read_range(late, late, 3)
+    assert not (await history.values(CELL, VARIABLE, both.request(3))).values
 
 
 async def test_a_question_that_nobody_waits_for_leaves_the_next_its_answer(history: JournalHistory) -> None:
