@@ -133,7 +133,7 @@ class SessionService:
             self._subscriptions.end_session(session, delete=True)
         session.actor = actor
         session.language = self._languages.choose(parameters.LocaleIds) or session.language
-        session.connection = context.connection
+        session.attach(context.connection)
         session.last_seen = self._sessions.clock()
         context.connection.activated()
         _log.info("%s (%s) logged in from %s", actor.user, actor.role.name.lower(), actor.address)

@@ -62,6 +62,15 @@ class Session:
         """Whether a user has logged in."""
         return self.actor is not None
 
+    def attach(self, connection: TcpConnection | None) -> None:
+        """Go on over a connection, or over none for now.
+
+        Publish requests that wait are answered by the numbers of the channel they came on: they end with it.
+        """
+        if connection is not self.connection:
+            self.connection = connection
+            self.publish_requests.clear()
+
     def renew_nonce(self) -> bytes:
         """Make the nonce the client has to sign next."""
         self.nonce = os.urandom(32)
@@ -182,8 +191,7 @@ class SessionTable:
         """Take a lost connection off its sessions; those that no user had logged in to are forgotten."""
         detached = [session for session in self._sessions.values() if session.connection is connection]
         for session in detached:
-            session.connection = None
-            session.publish_requests.clear()
+            session.attach(None)
             if not session.is_activated:
                 self.remove(session)
         return [session for session in detached if session.is_activated]

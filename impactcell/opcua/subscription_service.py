@@ -261,6 +261,8 @@ class SubscriptionService:
         results = notification_encoding.status_codes(
             await context.share.each(acknowledgements, lambda a: self._acknowledge(session, a))
         )
+        if session.connection is not context.connection:  # it has moved to another meanwhile
+            raise StatusCodeError(ua.StatusCodes.BadSecureChannelIdInvalid)
         subscriptions = self.subscriptions_of(session)
         if not subscriptions:
             raise StatusCodeError(ua.StatusCodes.BadNoSubscription)

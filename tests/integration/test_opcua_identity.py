@@ -9,7 +9,9 @@ from dataclasses import replace
 
 import pytest
 from asyncua import Client, ua
+from asyncua.common.utils import Buffer
 from asyncua.crypto import security_policies, uacrypto
+from asyncua.ua.ua_binary import struct_from_binary
 from cryptography.hazmat.primitives.asymmetric import rsa
 
 from impactcell.opcua.certificates import make_certificate
@@ -275,6 +277,64 @@ async def test_a_session_moves_with_its_client_and_only_with_a_signature(here: S
     await owner._cancel_task(owner._supervisor_task)
     await owner._cancel_task(owner._stale_watchdog_task)
     await hang_up(moved)
+
+
+async def test_what_was_asked_on_the_old_channel_is_not_answered_on_the_new_one(here: Site) -> None:
+    """Notifications went out under the numbers of Publish requests that the new channel had never seen."""
+    owner = await here.client("engineer")
+    await owner.connect()
+    create = ua.CreateSubscriptionRequest()
+    create.Parameters.RequestedPublishingInterval = 3.6e6  # it publishes when it is told to
+    made = struct_from_binary(ua.CreateSubscriptionResponse, await sent(owner, create))
+    subscription = here.server._host.subscription_service._subscriptions[made.Parameters.SubscriptionId]
+    items = ua.CreateMonitoredItemsRequest()
+    items.Parameters.SubscriptionId = subscription.id
+    level = (await here.node(owner, "Wear/Level")).nodeid
+    items.Parameters.ItemsToCreate = [
+        ua.MonitoredItemCreateRequest(
+            ua.ReadValueId(NodeId=level, AttributeId=ua.AttributeIds.Value), ua.MonitoringMode.Reporting,
+            ua.MonitoringParameters(1, 0.0, None, 10, True),
+        )
+    ]  # fmt: skip
+    await sent(owner, items)
+    asked = [asyncio.ensure_future(sent(owner, ua.PublishRequest())) for _ in range(3)]
+    await owner.get_node(ua.ObjectIds.Server).read_browse_name()  # by now they wait
+    assert len(subscription.session.publish_requests) == 3
+
+    moved = await on_a_channel(await here.client("engineer"))
+    protocol = moved.uaclient.protocol
+    protocol.authentication_token = owner.uaclient.protocol.authentication_token
+    await _know_the_policies(moved, owner)
+    moved._server_nonce = owner._server_nonce
+    answered, answer = [], protocol._call_callback
+
+    def note(number: int, body: object) -> None:
+        answered.append(number)
+        if number in protocol._callbackmap:
+            answer(number, body)
+
+    protocol._call_callback = note
+    before = protocol._request_id
+    assert await activation(moved) == 0
+    here.publish()
+    while here.server._host._values._fan_out._waiting:
+        await asyncio.sleep(0)
+    subscription._tick()
+    await moved.get_node(ua.ObjectIds.Server).read_browse_name()  # what was due has come before its answer
+    assert answered == list(range(before + 1, protocol._request_id + 1))
+    published = struct_from_binary(ua.PublishResponse, await sent(moved, ua.PublishRequest()))
+    assert published.Parameters.NotificationMessage.NotificationData
+    assert answered == list(range(before + 1, protocol._request_id + 1))
+    await hang_up(owner)
+    await asyncio.gather(*asked, return_exceptions=True)
+    await owner._cancel_task(owner._renew_channel_task)
+    await owner._cancel_task(owner._supervisor_task)
+    await owner._cancel_task(owner._stale_watchdog_task)
+    await hang_up(moved)
+
+
+async def sent(client: Client, request: object) -> Buffer:
+    return await client.uaclient.protocol.send_request(request, timeout=PATIENCE_S)
 
 
 async def test_a_session_that_nobody_has_logged_in_to_does_not_move(here: Site) -> None:
