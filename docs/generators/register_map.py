@@ -9,10 +9,10 @@ from generators.markdown import code, table
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.map_registers import CONSTANTS, MEASURED, NEEDED_BY, REQUIRED
 from impactcell.fieldbus.map_validation import _KEYS
+from impactcell.fieldbus.positioning_registers import COMMAND, SHOWN
 from impactcell.fieldbus.register_types import KINDS, SI_FACTOR
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.fieldbus.status_block import _BATCH, _POSITIONING
-from impactcell.fieldbus.tap_commands import _PARAMETERS
+from impactcell.fieldbus.status_block import _BATCH
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ROOT / "config" / "maps" / "fpga-v1.yaml"
@@ -82,7 +82,7 @@ def _together() -> list[tuple[str, str]]:
     """Say which registers are of no use without each other."""
     groups = {
         "batches that the PLC announces": _BATCH,
-        "positioning": (*_POSITIONING, *_PARAMETERS, "command_sequence"),
+        "positioning": (*SHOWN, *COMMAND),
         "stopping the tap that is under way": ("command_abort",),
     }
     return [(purpose, ", ".join(map(code, names))) for purpose, names in groups.items()]
