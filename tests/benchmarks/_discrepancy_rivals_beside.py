@@ -32,6 +32,8 @@ from tests.benchmarks._discrepancy_run import rows, study
 from tests.benchmarks.table import Table
 
 EVERY = 3
+NULL_ROWS, NULLS = Path("tests/benchmarks/rows/discrepancy-nulls-870000.jsonl"), 870_000
+"""Rows and first seed of the study with nothing hidden that the rivals were given."""
 
 
 def model_error_tasks() -> list[Task]:
@@ -43,8 +45,8 @@ def model_error_tasks() -> list[Task]:
 
 def null_tasks() -> list[nulls.NullJob]:
     """Every third campaign with nothing hidden, of each class alike."""
-    done = {row["key"] for row in rows(nulls.ROWS)}
-    return [job for job in nulls.jobs(500, nulls.REPORTING)[::EVERY] if job.key in done]
+    done = {row["key"] for row in rows(NULL_ROWS)}
+    return [job for job in nulls.jobs(500, NULLS)[::EVERY] if job.key in done]
 
 
 def run_null(job: nulls.NullJob) -> Row:
@@ -55,7 +57,7 @@ def run_null(job: nulls.NullJob) -> Row:
 def table() -> Table:
     """Shares of both studies, of each method."""
     error = _together(beside_error.ROWS)
-    none = _together(nulls.ROWS)
+    none = _together(NULL_ROWS)
     lines = [
         _line("beside model error: the effect named, or tied with it", error, lambda row: _judged(row)[0]),
         _line("beside model error: anything else named", error, lambda row: _judged(row)[1]),
@@ -115,7 +117,7 @@ def main() -> None:
     given = parser.parse_args()
     if not given.table:
         study(beside(beside_error.ROWS), model_error_tasks(), given.workers, run)
-        study(beside(nulls.ROWS), null_tasks(), given.workers, run_null)
+        study(beside(NULL_ROWS), null_tasks(), given.workers, run_null)
     print(table().markdown())
 
 
