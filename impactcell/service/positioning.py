@@ -157,7 +157,8 @@ class PositioningTask:
                 self._planner.accept_model()
 
         await self._worker.run(replan)
-        self._worker.belief = self._planner.posterior
+        if another_plant:
+            self._worker.belief = self._planner.posterior
         self._predictions = self._planner.predictions
         self._design = design
 

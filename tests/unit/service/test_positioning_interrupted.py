@@ -229,6 +229,7 @@ async def test_a_reload_takes_over_limits_and_mass(
     learned = task.belief
     await task.redesign(slower, cell_design(slower))
     assert task.belief.taps == learned.taps
+    assert task._worker.belief is None, "nothing has been learned that a restart should go on from"
     await task.begin(0.01)
     assert 0.0 < task.state.next_velocity_m_s <= 0.01 * (1.0 + 1e-9)
     assert 0.0 < task.state.next_stroke_m <= 0.4e-3 * (1.0 + 1e-9)
