@@ -1,34 +1,13 @@
 """A PLC that takes a part away before the outcome of its last tap has been read."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
-import pytest_asyncio
 
 from impactcell.fieldbus.status_block import PositioningStatus
 from impactcell.service.positioning import PositioningTask
-from impactcell.settings import CellConfig, read_cell
-from tests.integration.processes import CONFIG
-from tests.told_module import ToldModule, block, task_of, worker_of
-
-
-@pytest.fixture(scope="module")
-def cell() -> CellConfig:
-    return read_cell(CONFIG / "cells" / "positioning.yaml")
-
-
-@pytest.fixture
-def module(cell: CellConfig) -> ToldModule:
-    return ToldModule.of(cell)
-
-
-@pytest_asyncio.fixture
-async def task(tmp_path: Path, cell: CellConfig, module: ToldModule) -> AsyncIterator[PositioningTask]:
-    worker = worker_of(cell, tmp_path / "j")
-    yield task_of(cell, module, worker)
-    await worker.close()
+from tests.told_module import ToldModule, block
 
 
 class Tapper:

@@ -1,42 +1,23 @@
 """A positioning task that is aborted, replaced, interrupted or begun again: nothing is struck unasked."""
 
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-import pytest_asyncio
 
 from impactcell.errors import FieldbusError, LinkError, PositioningError
 from impactcell.fieldbus.status_block import PositioningStatus, StatusBlock
 from impactcell.service.factory import cell_design
 from impactcell.service.positioning import PositioningTask
 from impactcell.service.publisher import CellPublisher
-from impactcell.settings import CellConfig, read_cell
-from tests.integration.processes import CONFIG
+from impactcell.settings import CellConfig
 from tests.snapshots import make_capture, make_snapshot
 from tests.told_module import ToldModule, block, task_of, worker_of
 
 OPERATOR = "anna"
-
-
-@pytest.fixture(scope="module")
-def cell() -> CellConfig:
-    return read_cell(CONFIG / "cells" / "positioning.yaml")
-
-
-@pytest.fixture
-def module(cell: CellConfig) -> ToldModule:
-    return ToldModule.of(cell)
-
-
-@pytest_asyncio.fixture
-async def task(tmp_path: Path, cell: CellConfig, module: ToldModule) -> AsyncIterator[PositioningTask]:
-    worker = worker_of(cell, tmp_path / "j")
-    yield task_of(cell, module, worker)
-    await worker.close()
 
 
 class Striker:
