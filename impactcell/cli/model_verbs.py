@@ -50,10 +50,13 @@ def model_fit(
 ) -> None:
     """Fit a cell's first model to its own first taps, and put it into service; says if it is good enough.
 
-    `--taps` is of the journal, and counts for nothing beside `--campaign`.
+    `--taps` is of the journal; of a campaign all taps are taken.
     """
     from impactcell.cli.first_model import fit_model
+    from impactcell.errors import CampaignError
 
+    if campaign is not None and taps is not None:
+        raise CampaignError("--taps is of the journal; --campaign takes all taps of the campaign")
     fit_model(cell, campaign, taps, anyway=anyway, as_json=as_json)
 
 

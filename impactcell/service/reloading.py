@@ -25,8 +25,11 @@ def reloaded_cell(cell: CellConfig, log: CellLogger) -> CellConfig:
         for name in UNCHANGEABLE
         if getattr(reloaded.settings, name) != getattr(cell.settings, name)
     }
-    if unchangeable:
-        log.warning("changed, but taken over only by a restart: %s", ", ".join(unchangeable))
+    told = [*unchangeable]
+    if "module" not in unchangeable and reloaded.register_map != cell.register_map:
+        told.append(f"what {reloaded.settings.module.register_map} says")
+    if told:
+        log.warning("changed, but taken over only by a restart: %s", ", ".join(told))
     return replace(cell, settings=reloaded.settings.model_copy(update=unchangeable), model=reloaded.model)
 
 

@@ -316,6 +316,8 @@ def test_the_first_taps_of_the_journal_make_the_model(
         pass
     with pytest.raises(CampaignError, match="no taps are in it yet"):
         run_verb(["model", "fit", str(cell)])
+    with pytest.raises(CampaignError, match="--taps is of the journal"):
+        run_verb(["model", "fit", str(cell), "--campaign", str(shots), "--taps", "5"])
     with Journal(tmp_path / "own" / "own.sqlite", "own") as journal:
         for capture in captures[:5]:
             journal.append(capture, make_snapshot(capture), b"", ())
