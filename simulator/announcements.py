@@ -34,19 +34,20 @@ class BatchAnnouncer:
         begun = [batch for batch in self._batches if batch.from_cycle <= strikes + ANNOUNCED_CYCLES_AHEAD]
         if begun and begun[-1] is not self._last:
             self._last = begun[-1]
-            self._image.put("batch_from_cycle", max(begun[-1].from_cycle - strikes, 1) + cycle)
+            from_cycle = self._image.after(cycle, max(begun[-1].from_cycle - strikes, 1))
+            self._image.put("batch_from_cycle", from_cycle)
             self._image.put("batch_announced", begun[-1].id)
             self._image.put("batch_sequence", self._shown_sequence() + 1)
             if "batch_sequence" not in self._image.registers:
-                self._coming = (max(begun[-1].from_cycle - strikes, 1) + cycle, begun[-1].id)
-        self.take(cycle)
+                self._coming = (from_cycle, begun[-1].id)
+        self.take()
 
-    def take(self, cycle: int) -> None:
+    def take(self) -> None:
         """Look whether an announcement has been made, and whether its batch is there."""
         if self._shown_sequence() != self._sequence:
             self._sequence = self._shown_sequence()
             self._coming = (int(self._image.get("batch_from_cycle")), str(self._image.get("batch_announced")))
-        if self._coming is not None and self._coming[0] <= cycle + 1:
+        if self._coming is not None and self._image.is_next(self._coming[0]):
             self.batch_id = self._coming[1]
             self._coming = None
 

@@ -235,7 +235,7 @@ class Device:
             raise BlockingIOError
         commanded = self._image.get("command_sequence")
         self._image.write(address, words, table)
-        self._announcements.take(self.cycle)
+        self._announcements.take()
         if self._image.get("command_abort"):
             self._abort()
         if self._image.get("command_sequence") not in (0, commanded):

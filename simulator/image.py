@@ -11,14 +11,20 @@ from simulator.scripted import LAST_CYCLE, ScriptedDevice
 
 
 class RegisterImage:
-    """Registers by name; what the map does not have is written nowhere and reads as 0."""
+    """Registers by name; what the map does not have is written nowhere and reads as 0.
+
+    Attributes
+    ----------
+    unacknowledged : int
+        How many cycles have been made since the one that was acknowledged last.
+    """
 
     def __init__(self, registers: RegisterMap, session: int) -> None:
         self.registers = registers
         self.session = session
         self._image = ScriptedDevice(registers, session)
         self._overwritten = 0
-        self._acknowledged = 0
+        self.unacknowledged = 0
 
     def put(self, name: str, value: Any) -> None:
         """Show a value."""
@@ -37,36 +43,40 @@ class RegisterImage:
         """Write words and take acknowledgements; LookupError and ValueError as the device's `write`."""
         self._image.write(address, words, table)
         for session, cycle in self._image.acknowledged:
-            if session == int(self.get("session")) and cycle:
-                self._acknowledged = cycle
+            if session == int(self.get("session")) and (cycle or self._image.has_cycle_0):
+                self.unacknowledged = min(self.unacknowledged, self._made_since(cycle))
                 self.put("acknowledged_cycle", cycle)
         self._image.acknowledged.clear()
 
-    @property
-    def unacknowledged(self) -> int:
-        """How many cycles have been made since the one that was acknowledged last."""
-        return (int(self.get("cycle_counter")) - self._acknowledged) % LAST_CYCLE
+    def _made_since(self, cycle: int) -> int:
+        return (int(self.get("cycle_counter")) - cycle) % self._image.period
+
+    def after(self, cycle: int, count: int) -> int:
+        """Return what the counter shows so many cycles after one."""
+        return self._image.after(cycle, count)
+
+    def is_next(self, cycle: int) -> bool:
+        """Whether the next cycle has this number, or a later one: of two ways round, the shorter."""
+        return (int(self.get("cycle_counter")) + 1 - cycle) % self._image.period < self._image.period // 2
 
     def complete(self, samples: Mapping[str, NDArray[np.float64]], header: Mapping[str, float | str]) -> int:
         """Put a cycle into the ring, counting the one that has to leave for it; returns its number."""
-        counter = int(self.get("cycle_counter"))
-        ring = np.atleast_1d(self.get("ring_cycle"))
-        leaving = int(ring[self._image.next_slot])
-        acknowledged = int(self.get("acknowledged_cycle"))
-        if leaving and (counter - leaving) % LAST_CYCLE < (counter - acknowledged) % LAST_CYCLE:
+        leaving = self._image.leaving
+        if leaving is not None and self._made_since(leaving) < self.unacknowledged:
             self._overwritten += 1
             self.put("overwritten_count", self._overwritten)
         in_map = {name: value for name, value in header.items() if name in self.registers}
+        self.unacknowledged += 1
         return self._image.complete(samples, **in_map)
 
     def count_from(self, cycle: int) -> None:
         """Go on counting after `cycle`; what was made before is waited for no longer."""
         self.put("cycle_counter", cycle)
-        self._acknowledged = cycle
+        self.unacknowledged = 0
 
     def restart(self) -> int:
         """Empty the ring and set the counter to zero; returns the new session."""
         self.session = self.session % LAST_CYCLE + 1
-        self._overwritten = self._acknowledged = 0
+        self._overwritten = self.unacknowledged = 0
         self._image.start(self.session)
         return self.session

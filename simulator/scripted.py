@@ -102,12 +102,19 @@ class ScriptedDevice:
         """Slot that the next cycle goes to; the oldest is there."""
         return (self._newest + 1) % self.registers.slots
 
+    @property
+    def leaving(self) -> int | None:
+        """Cycle of the ring that the next one will overwrite; None where none lies there."""
+        if not (self.registers.has_ring and self._slots[self.next_slot]):
+            return None
+        return int(self.get("ring_cycle")[self.next_slot])
+
     def complete(self, samples: Mapping[str, ArrayLike], **header: float | str) -> int:
         """Finish a cycle: put it into the oldest slot and raise the counter; return its number.
 
         `samples` holds force, position and actuator in SI; `header` any register of the window.
         """
-        cycle = self._after(int(self.get("cycle_counter")))
+        cycle = self.after(int(self.get("cycle_counter")))
         slot = self.next_slot
         self._slots[slot] = self._encoded(slot, cycle, samples, header)
         if slot == self._selected:
@@ -121,10 +128,19 @@ class ScriptedDevice:
         self.put("cycle_counter", cycle)
         return cycle
 
-    def _after(self, cycle: int) -> int:
-        """Return what the counter shows after a cycle."""
-        few = _FEW_CYCLES.get(self.registers["cycle_counter"].kind)
-        return cycle % LAST_CYCLE + 1 if few is None else (cycle + 1) % few
+    @property
+    def period(self) -> int:
+        """After so many cycles the counter shows the same number again."""
+        return _FEW_CYCLES.get(self.registers["cycle_counter"].kind, LAST_CYCLE)
+
+    @property
+    def has_cycle_0(self) -> bool:
+        """Whether a cycle can have the number 0; of a long counter that is none."""
+        return self.period < LAST_CYCLE
+
+    def after(self, cycle: int, count: int = 1) -> int:
+        """Return what the counter shows so many cycles after one."""
+        return (cycle + count) % self.period if self.has_cycle_0 else (cycle + count - 1) % self.period + 1
 
     def _encoded(
         self, slot: int, cycle: int, samples: Mapping[str, ArrayLike], header: Mapping[str, float | str]

@@ -13,6 +13,9 @@ from simulator.serving import serve
 from tests.integration.processes import CONFIG
 from tests.module_client import MAP, Client, scenario
 
+COUNTERS = ("cycle_counter", "ring_cycle", "window_cycle", "acknowledge_cycle", "acknowledged_cycle",
+            "batch_from_cycle", "command_cycle")  # fmt: skip
+
 
 def test_identity_before_the_first_cycle() -> None:
     client = Client(scenario(), session=77)
@@ -122,6 +125,58 @@ def test_a_schedule_that_waits_until_cycles_are_stored() -> None:
     client.device.restart()
     assert made_by(299.0) == 3
     assert client.get("overwritten_count") == 0
+
+
+def short_counter(kind: str) -> RegisterMap:
+    """The shipped map, of a module whose counters are of a type with few numbers."""
+    content = yaml.safe_load((CONFIG / "maps" / "fpga-v1.yaml").read_text())
+    for name in COUNTERS:
+        content["registers"][name]["type"] = kind
+    return RegisterMap.from_mapping(content)
+
+
+@pytest.mark.parametrize(("kind", "last"), [("u16", 65_535), ("bcd16", 9_999), ("bcd32", 99_999_999)])
+def test_a_schedule_goes_on_waiting_where_a_short_counter_begins_anew(kind: str, last: int) -> None:
+    """Cycle 0 is one like the others, and acknowledged as they are."""
+    registers = short_counter(kind)
+    client = Client(scenario(strikes={"period_s": 1.0, "ahead": 2}), registers, session=5)
+    client.put("acknowledge_session", 5)
+    client.device.set_counter(last - 1)
+    for second in range(registers.slots + 8):
+        client.device.update(second + 0.9)
+        client.put("acknowledge_cycle", client.get("cycle_counter"))
+    cycles = [truth["cycle"] for truth in client.truth]
+    assert cycles[:4] == [last, 0, 1, 2]
+    assert len(cycles) == registers.slots + 7
+    assert client.get("acknowledged_cycle") == client.get("cycle_counter") == cycles[-1]
+    assert client.get("overwritten_count") == 0
+
+
+def test_a_short_counter_that_begins_anew_counts_what_its_ring_lost() -> None:
+    registers = short_counter("u16")
+    client = Client(scenario(), registers, session=5)
+    client.put("acknowledge_session", 5)
+    client.device.set_counter(65_533)
+    client.device.overrun(registers.slots)  # 65534, 65535, 0, 1 and so on
+    client.put("acknowledge_cycle", 65_535)
+    client.device.overrun(2)
+    assert client.get("overwritten_count") == 0
+    client.device.overrun(3)
+    assert client.get("overwritten_count") == 3
+    assert client.get("ring_cycle").tolist().count(0) == 0
+
+
+@pytest.mark.parametrize(("registers", "last"), [(MAP, 2**32 - 1), (short_counter("u16"), 65_535)])
+def test_a_batch_that_is_announced_while_the_counter_begins_anew(registers: RegisterMap, last: int) -> None:
+    batches = [{"from_cycle": 1, "id": "A"}, {"from_cycle": 3, "id": "B"}]
+    client = Client(scenario(batches=batches), registers)
+    client.device.set_counter(last - 1)
+    seen = []
+    for second in range(1, 6):
+        client.device.update(second + 0.9)
+        seen.append(client.read_slot(int(client.get("newest_slot"))).batch_id)
+    assert seen == ["A", "A", "B", "B", "B"]
+    assert client.get("batch_from_cycle") == client.truth[2]["cycle"]
 
 
 def test_a_schedule_cannot_wait_for_what_the_map_does_not_have() -> None:
