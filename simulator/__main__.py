@@ -26,7 +26,12 @@ def _parser() -> argparse.ArgumentParser:
     campaign = verbs.add_parser("campaign", help="write a campaign directory and its truth")
     campaign.add_argument("scenario", type=Path, metavar="SCENARIO.yaml", help="as config/sim/campaign.yaml")
     campaign.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="DIR", help="a directory that is not there yet"
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="a directory that is not there yet",
     )
     campaign.add_argument(
         "--hide", action="append", default=[], metavar="EFFECT", help="effect that acts; repeatable"
@@ -60,11 +65,9 @@ def _port(text: str) -> int:
 
 
 def _serve(options: argparse.Namespace) -> int:
-    from simulator.scenario import read_scenario
-    from simulator.serving import read_register_map, run
+    from simulator.serving import read_scenario_and_map, run
 
-    scenario = read_scenario(options.scenario)
-    registers = read_register_map(options.scenario.parent / scenario.register_map)
+    scenario, registers = read_scenario_and_map(options.scenario)
     if options.port is not None:
         scenario = scenario.model_copy(
             update={"listen": scenario.listen.model_copy(update={"port": options.port})}

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from simulator.effects import check
 from simulator.fault_schedule import ScheduledFault
@@ -15,6 +15,21 @@ Cycle = Annotated[int, Field(ge=1)]
 """Number of a cycle, from 1."""
 Rate = Annotated[int, Field(ge=1, le=1_000_000)]
 """Samples a second, a whole number."""
+
+
+def _beside(file: str, info: ValidationInfo) -> str:
+    """Give where a file lies that is named from the scenario's directory."""
+    path = Path((info.context or {}).get("directory", "")) / file
+    try:
+        path.open("rb").close()
+    except OSError as error:
+        message = f"{path} cannot be read: {error.strerror}"
+        raise ValueError(message) from error
+    return str(path)
+
+
+PemFile = Annotated[str, AfterValidator(_beside)]
+"""A file of certificates or keys, from the scenario's directory."""
 Effects = dict[str, dict[str, float | list[float]]]
 
 
@@ -28,14 +43,15 @@ class Listen(ScenarioModel):
     """Where the module answers; port 0 lets the system choose.
 
     Transport `rtu` makes a serial line of its own, a pseudo terminal, as slow as `baudrate` says; `tls` needs
-    the module's certificate and key, and the authority that the client's certificate must lead to (PEM).
+    the module's certificate and key, and the authority that the client's certificate must lead to (PEM, from
+    the scenario's directory).
     """
 
     transport: Literal["tcp", "tls", "udp", "rtu_over_tcp", "rtu"] = "tcp"
     baudrate: Annotated[int, Field(ge=300)] = 115_200
-    certificate: str | None = None
-    key: str | None = None
-    client_authority: str | None = None
+    certificate: PemFile | None = None
+    key: PemFile | None = None
+    client_authority: PemFile | None = None
 
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 0
@@ -112,7 +128,7 @@ class Batch(ScenarioModel):
     """A batch of material; `shift` is its mu_s against the first batch. The PLC may say nothing of it."""
 
     from_cycle: Cycle
-    id: Annotated[str, Field(min_length=1, max_length=32)]
+    id: Annotated[str, Field(min_length=1)]
     shift: float = 0.0
     announced: bool = True
 
@@ -189,7 +205,7 @@ class Scenario(ScenarioModel):
 
     format: Literal[1]
     name: str = "prototype"
-    serial_number: Annotated[str, Field(max_length=16)] = "SIM-0001"
+    serial_number: str = "SIM-0001"
     register_map: str
     listen: Listen = Listen()
     seed: Annotated[int, Field(ge=0)] = 1

@@ -20,7 +20,8 @@ from simulator.device import Device, Truth
 from simulator.fault_schedule import arm
 from simulator.faults import FaultInjector
 from simulator.listening import server_of
-from simulator.scenario import Scenario
+from simulator.map_faults import map_faults
+from simulator.scenario import Scenario, read_scenario
 from simulator.serial_line import SerialServer
 
 LONGEST_NAP_S = 0.5
@@ -41,6 +42,27 @@ def read_register_map(file: Path) -> RegisterMap:
     except (MapError, TypeError, AttributeError) as error:
         message = f"{file}: {error}"
         raise SettingsError(message) from error
+
+
+def read_scenario_and_map(file: Path) -> tuple[Scenario, RegisterMap]:
+    """Read a scenario, and the register map that it names.
+
+    Raises
+    ------
+    SettingsError
+        Every fault at once, as `file:line:column: message`: of the scenario, of the map, or of the scenario
+        with that map.
+    """
+    scenario = read_scenario(file)
+    registers = read_register_map(file.parent / scenario.register_map)
+    faults = tuple(map_faults(scenario, registers))
+    if faults:
+        _, positions = yaml_loader.load(file)
+        told = (
+            yaml_loader.format_error(file, positions.value(fault.location), fault.message) for fault in faults
+        )
+        raise SettingsError("\n".join(told))
+    return scenario, registers
 
 
 @contextlib.contextmanager
@@ -72,12 +94,11 @@ async def serve(
     Raises
     ------
     SettingsError
-        The schedule waits for acknowledgements that the map has no register for.
+        The scenario asks for what a module with this map cannot do or show.
     """
-    if scenario.strikes and scenario.strikes.ahead and "acknowledge_cycle" not in registers:
-        message = f"{scenario.name}: `strikes.ahead` waits until cycles are acknowledged, and the register "
-        message += "map has no `acknowledge_cycle`: leave `ahead` out, or give the map that register"
-        raise SettingsError(message)
+    faults = [f"{scenario.name}: {fault.message}" for fault in map_faults(scenario, registers)]
+    if faults:
+        raise SettingsError("\n".join(faults))
     loop = asyncio.get_running_loop()
     stop = asyncio.Event()
     with stop_on_signals(stop) as received, _truths(truth_file, verbose=verbose) as tell:

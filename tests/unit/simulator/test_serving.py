@@ -7,9 +7,11 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,6 +19,7 @@ from impactcell.errors import SettingsError
 from simulator.__main__ import main
 from simulator.scenario import read_scenario
 from simulator.serving import read_register_map
+from tests.certificates import Authority
 from tests.patience import PATIENCE_S
 
 CONFIG = Path(__file__).parents[3] / "config"
@@ -116,6 +119,127 @@ def test_missing_files_end_with_code_2(tmp_path: Path, capsys: pytest.CaptureFix
     assert "register cycle_counter is missing" in capsys.readouterr().err
 
 
+@pytest.fixture
+def taken_port() -> Iterator[str]:
+    """A port at which nothing can listen: a scenario that is not refused ends there, and does not serve."""
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        yield str(taken.getsockname()[1])
+
+
+UNSIGNED = {
+    name: {"address": address, "type": "u16"}
+    for name, address in (("mass", 30), ("direction", 31), ("serial_number", 32))
+}
+"""Registers of a map in which no text and nothing below 0 can stand."""
+
+
+@pytest.mark.parametrize(
+    ("layout", "text", "told"),
+    [
+        *(
+            (
+                "summary",
+                f"faulty_captures: [{{cycle: 1, kind: empty}}, {{cycle: 2, kind: @{kind}}}]",
+                f"`faulty_captures[1]` ({kind}) is one of the force, and the register map has no `force`",
+            )
+            for kind in ("constant_force", "saturated", "no_separation", "not_a_number")
+        ),
+        (
+            "one-buffer",
+            "faulty_captures: [{cycle: 2, kind: @not_a_number}]",
+            "`faulty_captures[0].kind` cannot be shown: register force has no code for a value that is not a",
+        ),
+        (
+            "summary",
+            "faults: [{at_s: 1, kind: set_counter, value: @70000}]",
+            "`faults[0].value` cannot be shown: register cycle_counter: value outside 0..65535; change it",
+        ),
+        (
+            "summary",
+            "batches: [{from_cycle: 1, id: A}, {from_cycle: 9, id: @twenty-characters-it}]",
+            "`batches[1].id` cannot be shown: register batch_id: 20 bytes do not fit 8 registers",
+        ),
+        (
+            "fpga-v1",
+            f"batches: [{{from_cycle: 1, id: @{'ü' * 17}}}]",
+            "register batch_announced: 34 bytes do not fit 16 registers",
+        ),
+        ("fpga-v1", "serial_number: @Prüfstand-Süd-1", "serial_number: 17 bytes do not fit 8 registers"),
+        (
+            "unsigned",
+            "part: {mass_stated: @false}",
+            "`part.mass_stated` cannot be shown: register mass has no",
+        ),
+        (
+            "unsigned",
+            "strikes: {directions: @[1, -1]}",
+            "`strikes.directions` cannot be shown: register direc",
+        ),
+        ("unsigned", "serial_number: @ABC", "register serial_number is a number, not 'ABC'"),
+    ],
+)
+def test_what_a_map_cannot_show_is_told_before_anything_is_served(
+    tmp_path: Path, layout: str, text: str, told: str, taken_port: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`@` marks the place that is told."""
+    shipped = CONFIG / "maps" / f"{'summary' if layout == 'unsigned' else layout}.yaml"
+    content = yaml.safe_load(shipped.read_text())
+    content["registers"] |= UNSIGNED if layout == "unsigned" else {}
+    (tmp_path / "m.yaml").write_text(yaml.safe_dump(content))
+    file = tmp_path / "s.yaml"
+    good = GOOD if "strikes" not in text else GOOD.replace("strikes: {period_s: 1}\n", "")
+    file.write_text(good + text.replace("@", "") + "\n")
+    assert main(["serve", str(file), "--port", taken_port]) == 2
+    place = f"{file}:{good.count(chr(10)) + 1}:{text.index('@') + 1}: "
+    lines = capsys.readouterr().err.splitlines()
+    assert any(line.startswith(place) and told in line for line in lines), lines
+
+
+def test_a_batch_that_the_plc_does_not_announce_fits_every_map(
+    tmp_path: Path, taken_port: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (
+        f"batches: [{{from_cycle: 1, id: {'A' * 16}}}, {{from_cycle: 2, id: {'x' * 99}, announced: false}}]\n"
+    )
+    file = tmp_path / "s.yaml"
+    file.write_text(GOOD.replace("m.yaml", str(CONFIG / "maps" / "summary.yaml")) + text)
+    assert main(["serve", str(file), "--port", taken_port]) == 1
+    assert "cannot listen" in capsys.readouterr().err
+
+
+def test_a_wait_for_what_the_map_does_not_have_is_told_with_its_place(
+    tmp_path: Path, taken_port: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "s.yaml"
+    maps = str(CONFIG / "maps" / "summary.yaml")
+    file.write_text(GOOD.replace("m.yaml", maps).replace("period_s: 1", "ahead: 8"))
+    assert main(["serve", str(file), "--port", taken_port]) == 2
+    assert capsys.readouterr().err.startswith(
+        f"{file}:3:18: `strikes.ahead` waits until cycles are acknowledged"
+    )
+
+
+def test_certificates_lie_where_the_scenario_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, taken_port: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    certificate, key = Authority(tmp_path, "plant").issue("module")
+    file, elsewhere = tmp_path / "s.yaml", tmp_path / "elsewhere"
+    listen = f"listen: {{transport: tls, certificate: {certificate.name}, key: {key.name}}}\n"
+    good = GOOD.replace("m.yaml", str(CONFIG / "maps" / "summary.yaml"))
+    file.write_text(good + listen)
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    assert main(["serve", str(file), "--port", taken_port]) == 1
+    assert "--port chooses another" in capsys.readouterr().err
+    file.write_text(good + listen.replace(key.name, "absent.key"))
+    assert main(["serve", str(file), "--port", taken_port]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith(f"{file}:4:{listen.index(key.name) + 1}: listen.key: ")
+    assert f"{tmp_path / 'absent.key'} cannot be read: No such file or directory" in told
+
+
 def read_registers(port: int, address: int, count: int) -> bytes:
     with socket.create_connection(("127.0.0.1", port), timeout=PATIENCE_S) as link:
         link.sendall(bytes([0, 1, 0, 0, 0, 6, 1, 3]) + address.to_bytes(2, "big") + count.to_bytes(2, "big"))
@@ -155,12 +279,8 @@ def test_serves_until_it_is_told_to_stop(tmp_path: Path, how: signal.Signals, co
     assert lines[0]["mu_s"] == pytest.approx(0.2, rel=0.05)
 
 
-def test_a_port_that_is_taken(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        port = taken.getsockname()[1]
-        assert main(["serve", str(CONFIG / "sim" / "demo.yaml"), "--port", str(port)]) == 1
+def test_a_port_that_is_taken(taken_port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["serve", str(CONFIG / "sim" / "demo.yaml"), "--port", taken_port]) == 1
     told = capsys.readouterr().err
     assert "cannot listen" in told
     assert "--port chooses another" in told
