@@ -62,16 +62,16 @@ def arm(
         What happens once: `restart()`, `drop_clients()`, `set_counter(value)` and `overrun(cycles)`.
     """
     loop = asyncio.get_running_loop()
+    begun_s = loop.time()
     handles = []
     for entry in entries:
         if entry.kind in _MOMENTARY:
             needed = _MOMENTARY[entry.kind]
             arguments = () if needed is None else (getattr(entry, needed),)
-            handles.append(loop.call_later(entry.at_s, actions[entry.kind], *arguments))
+            handles.append(loop.call_at(begun_s + entry.at_s, actions[entry.kind], *arguments))
             continue
-        kind = FaultKind(entry.kind)
-        fault = Fault(kind, entry.probability, None, entry.seconds, entry.code)
-        handles.append(loop.call_later(entry.at_s, faults.inject, fault))
+        fault = Fault(FaultKind(entry.kind), entry.probability, None, entry.seconds, entry.code)
+        handles.append(loop.call_at(begun_s + entry.at_s, faults.inject, fault))
         if entry.lasts_s is not None:
-            handles.append(loop.call_later(entry.at_s + entry.lasts_s, faults.clear, kind))
+            handles.append(loop.call_at(begun_s + entry.at_s + entry.lasts_s, faults.withdraw, fault))
     return handles

@@ -98,6 +98,10 @@ class FaultInjector:
         """Arm a fault beside those armed already."""
         self._faults.append(fault)
 
+    def withdraw(self, fault: Fault) -> None:
+        """Disarm this fault, and no other of its kind, if it is still armed."""
+        self._faults = [armed for armed in self._faults if armed is not fault]
+
     def clear(self, kind: FaultKind | None = None) -> None:
         """Disarm all faults, or those of one kind."""
         self._faults = [] if kind is None else [fault for fault in self._faults if fault.kind != kind]

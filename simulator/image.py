@@ -64,7 +64,7 @@ class RegisterImage:
         leaving = self._image.leaving
         if leaving is not None and self._made_since(leaving) < self.unacknowledged:
             self._overwritten += 1
-            self.put("overwritten_count", self._overwritten)
+            self._image.put_count("overwritten_count", self._overwritten)
         in_map = {name: value for name, value in header.items() if name in self.registers}
         self.unacknowledged += 1
         return self._image.complete(samples, **in_map)

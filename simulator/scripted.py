@@ -11,7 +11,7 @@ from impactcell.fieldbus.registers import REGISTER_SPACE, WIRE, RegisterMap, Wor
 LAST_CYCLE: Final = 2**32 - 1
 """Largest cycle number: 32 bits."""
 _FEW_CYCLES: Final = {"u16": 2**16, "bcd16": 10**4, "bcd32": 10**8}
-"""After so many cycles a counter of these types begins with 0 again."""
+"""After so many a counter of these types begins with 0 again."""
 _NOT_OF_A_SLOT: Final = ("window_sequence", "capture_ready", "cycle_counter")
 """Read with a capture, but not part of it."""
 
@@ -61,6 +61,12 @@ class ScriptedDevice:
         if name in self.registers:
             self.put(name, value)
 
+    def put_count(self, name: str, count: int) -> None:
+        """Show what counts on, where there is such a register: a short one begins with 0 again."""
+        if name in self.registers:
+            few = _FEW_CYCLES.get(self.registers[name].kind)
+            self.put(name, count if few is None else count % few)
+
     def put(self, name: str, value: ArrayLike | str) -> None:
         """Show `value` in a register."""
         register = self.registers[name]
@@ -88,9 +94,7 @@ class ScriptedDevice:
     def start(self, session: int, counter: int = 0) -> None:
         """Begin a life: an empty ring, and the counter where it is told."""
         self._slots = [{} for _ in range(self.registers.slots)]
-        if "session" in self.registers:
-            few = _FEW_CYCLES.get(self.registers["session"].kind)
-            self.put("session", session if few is None else session % few)
+        self.put_count("session", session)
         self.put("cycle_counter", counter)
         self._put_if_there("ring_cycle", np.zeros(self.registers.slots, dtype=np.int64))
         self._selected = 0
@@ -178,8 +182,8 @@ class ScriptedDevice:
     def _show(self) -> None:
         """Show the selected slot in the window, under a new sequence number."""
         self._sequence += 2
-        self._put_if_there("window_sequence", self._sequence)
-        self._put_if_there("window_sequence_after", self._sequence)
+        self.put_count("window_sequence", self._sequence)
+        self.put_count("window_sequence_after", self._sequence)
         slot = self._slots[self._selected]
         for name in (*self._of_slot, *self.registers.arrays):
             register = self.registers[name]

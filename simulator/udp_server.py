@@ -24,6 +24,14 @@ class _Peer(asyncio.Transport):
         """Do nothing: there is no connection that could be reset."""
 
 
+class _DatagramConnection(ClientConnection):
+    """One client; what a datagram holds beside whole requests belongs to no other."""
+
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        self._buffer = b""
+
+
 class _Datagrams(asyncio.DatagramProtocol):
     def __init__(self, server: ModbusServer) -> None:
         self.gone = asyncio.Event()
@@ -38,7 +46,7 @@ class _Datagrams(asyncio.DatagramProtocol):
         assert self._endpoint is not None  # noqa: S101 - it is what has received
         client = self._clients.get(addr)
         if client is None:
-            client = self._clients[addr] = ClientConnection(self._server)
+            client = self._clients[addr] = _DatagramConnection(self._server)
             client.connection_made(_Peer(self._endpoint, addr))
         client.data_received(data)
 

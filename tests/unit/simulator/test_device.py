@@ -9,6 +9,7 @@ import yaml
 
 from impactcell.errors import SettingsError
 from impactcell.fieldbus.registers import RegisterMap
+from simulator.image import RegisterImage
 from simulator.serving import serve
 from tests.integration.processes import CONFIG
 from tests.module_client import MAP, Client, scenario
@@ -164,6 +165,19 @@ def test_a_short_counter_that_begins_anew_counts_what_its_ring_lost() -> None:
     client.device.overrun(3)
     assert client.get("overwritten_count") == 3
     assert client.get("ring_cycle").tolist().count(0) == 0
+
+
+def test_short_registers_that_count_begin_anew() -> None:
+    """Before, the module broke off as soon as one of them was full."""
+    content = yaml.safe_load((CONFIG / "maps" / "fpga-v1.yaml").read_text())
+    for name in ("overwritten_count", "window_sequence", "window_sequence_after"):
+        content["registers"][name]["type"] = "bcd16"
+    image = RegisterImage(RegisterMap.from_mapping(content), session=5)
+    for _ in range(10_000 + MAP.slots + 3):
+        image.complete({}, {})
+        image.write(MAP["slot_select"].address, MAP["slot_select"].encode(image.get("newest_slot")))
+    assert image.get("overwritten_count") == 3
+    assert image.get("window_sequence") == image.get("window_sequence_after") < 10_000
 
 
 @pytest.mark.parametrize(("registers", "last"), [(MAP, 2**32 - 1), (short_counter("u16"), 65_535)])

@@ -8,7 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from simulator.fault_schedule import ScheduledFault, arm
-from simulator.faults import FaultInjector, FaultKind
+from simulator.faults import Fault, FaultInjector, FaultKind
 
 
 async def test_entries_happen_in_time_and_end() -> None:
@@ -31,6 +31,22 @@ async def test_entries_happen_in_time_and_end() -> None:
     await over.wait()
     assert done == [("overrun", 20), ("set_counter", 4_294_967_290)]
     assert states == [True, False]
+
+
+async def test_the_end_of_one_fault_leaves_another_of_its_kind() -> None:
+    faults, over = FaultInjector(), asyncio.Event()
+    states: list[Fault | None] = []
+    entries = [
+        ScheduledFault(at_s=0.0, kind="exception", lasts_s=0.01, code=4),
+        ScheduledFault(at_s=0.0, kind="exception", lasts_s=0.03, code=5),
+        ScheduledFault(at_s=0.02, kind="overrun", cycles=1),
+        ScheduledFault(at_s=0.04, kind="restart"),
+    ]
+    actions = {"overrun": lambda _: states.append(faults.choose()), "restart": over.set}
+    arm(entries, faults, actions)
+    await over.wait()
+    assert [fault and fault.code for fault in states] == [5]
+    assert not faults.active
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,9 @@ from impactcell.fieldbus.registers import WIRE, Words
 from simulator.control import Control
 from simulator.faults import Fault, FaultInjector, FaultKind, corrupt
 from simulator.modbus_server import ModbusServer
+from simulator.udp_server import UdpServer
 from tests.module_client import Client, scenario
+from tests.patience import PATIENCE_S
 
 
 class Image:
@@ -131,6 +133,26 @@ async def test_what_is_not_modbus_is_cut_off_and_others_go_on() -> None:
         with pytest.raises((asyncio.IncompleteReadError, ConnectionError)):
             await bad.receive()
         assert await good.ask(bytes.fromhex("0300070001")) == b"\x03\x02\x00\x07"
+
+
+@pytest.mark.parametrize("stray", ["00", "000900000006", "0009000000060103", "0009000100060103"])
+async def test_a_datagram_that_is_no_request_is_no_part_of_the_next(stray: str) -> None:
+    replies: asyncio.Queue[bytes] = asyncio.Queue()
+
+    class Receiver(asyncio.DatagramProtocol):
+        def datagram_received(self, data: bytes, _: Any) -> None:
+            replies.put_nowait(data)
+
+    async with UdpServer(Image()) as server:
+        loop = asyncio.get_running_loop()
+        client, _ = await loop.create_datagram_endpoint(Receiver, remote_addr=("127.0.0.1", server.port))
+        for transaction in (1, 2):
+            client.sendto(bytes.fromhex(stray))
+            client.sendto(struct.pack(">HHHBBHH", transaction, 0, 6, 1, 3, 7, 1))
+            async with asyncio.timeout(PATIENCE_S):
+                reply = await replies.get()
+            assert reply == struct.pack(">HHHBBBH", transaction, 0, 5, 1, 3, 2, 7)
+        client.close()
 
 
 async def test_several_clients_are_served() -> None:
