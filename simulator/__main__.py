@@ -31,7 +31,7 @@ def _parser() -> argparse.ArgumentParser:
         type=Path,
         required=True,
         metavar="DIR",
-        help="a directory that is not there yet",
+        help="a directory that is empty, or not there yet",
     )
     campaign.add_argument(
         "--hide", action="append", default=[], metavar="EFFECT", help="effect that acts; repeatable"

@@ -102,8 +102,8 @@ def _plan(scenario: CampaignScenario, random: np.random.Generator) -> Iterator[P
             start_m=start,
             batch=(number - 1) * len(scenario.batches) // count,
             dwell_s=round(float(np.exp(random.uniform(np.log(low), np.log(high)))), 1),
-            factor=float(1.0 + scenario.friction_scatter * random.standard_normal()),
-            ratio_factor=float(1.0 + scenario.ratio_scatter * random.standard_normal()),
+            factor=_above_zero(random, 1.0, scenario.friction_scatter),
+            ratio_factor=_above_zero(random, 1.0, scenario.ratio_scatter),
             strength=1.0,
             columns={},
         )
@@ -124,12 +124,18 @@ def _with_columns(scenario: CampaignScenario, plan: PlannedShot, random: np.rand
 def _off_told(scenario: CampaignScenario, plan: PlannedShot, random: np.random.Generator) -> PlannedShot:
     """Draw how far velocity and mass of a shot are from what is told of them."""
     told = scenario.told
-    velocity, mass = random.standard_normal(2)
     return replace(
         plan,
-        velocity_over_told=float(1.0 + told.velocity_error + told.velocity_scatter * velocity),
-        mass_over_told=float(1.0 + told.mass_error + told.mass_scatter * mass),
+        velocity_over_told=_above_zero(random, 1.0 + told.velocity_error, told.velocity_scatter),
+        mass_over_told=_above_zero(random, 1.0 + told.mass_error, told.mass_scatter),
     )
+
+
+def _above_zero(random: np.random.Generator, mean: float, scatter: float) -> float:
+    """Draw from a normal distribution, again and again where that is not above 0; `mean` is."""
+    while (drawn := mean + scatter * random.standard_normal()) <= 0.0:
+        pass
+    return drawn
 
 
 def _factor(table: Sequence[tuple[float, float]], value: float) -> float:

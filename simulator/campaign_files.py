@@ -22,16 +22,17 @@ from simulator.plant import Plant
 def write(scenario: CampaignScenario, directory: Path) -> Path:
     """Make the campaign, write it to `directory` and its truth beside it; returns the truth file.
 
+    A directory that is there and empty is filled, as `.` is for a shell that stands in it.
+
     Raises
     ------
     CampaignError
         One of the two exists already, or cannot be written.
     """
+    directory = directory.resolve()
+    _check_free(directory)
     truth = directory.with_name(directory.name + ".truth.json")
-    for place in (directory, truth):
-        if place.exists() and not (place.is_dir() and not any(place.iterdir())):
-            message = f"{place}: exists already; choose another name or remove it"
-            raise CampaignError(message)
+    _check_free(truth)
     base, shots = make(scenario)
     beside = directory.with_name(f".{directory.name}.partial")
     try:
@@ -43,14 +44,22 @@ def write(scenario: CampaignScenario, directory: Path) -> Path:
             (beside / "traces" / f"{shot.plan.number}.csv").write_text(_trace(shot), encoding="utf-8")
         truth.write_text(json.dumps(_truth(scenario, base, shots), indent=1) + "\n", encoding="utf-8")
         if directory.is_dir():
-            directory.rmdir()
-        beside.rename(directory)
+            for part in sorted(beside.iterdir(), reverse=True):  # campaign.yaml last
+                part.rename(directory / part.name)
+        else:
+            beside.rename(directory)
     except OSError as error:
         message = f"{directory}: cannot be written: {error.strerror}"
         raise CampaignError(message) from error
     finally:
         shutil.rmtree(beside, ignore_errors=True)
     return truth
+
+
+def _check_free(place: Path) -> None:
+    if place.exists() and not (place.is_dir() and not any(place.iterdir())):
+        message = f"{place}: exists already; choose another name or remove it"
+        raise CampaignError(message)
 
 
 def _header(scenario: CampaignScenario) -> str:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, field_validator, model_validator
 
 from simulator.effects import LIBRARY, UNLISTED, check
 from simulator.scenario_file import NotNegative, Positive, ScenarioModel
@@ -11,6 +11,21 @@ from simulator.scenario_file import NotNegative, Positive, ScenarioModel
 Share = Annotated[float, Field(ge=0, lt=1)]
 """A number from 0 to below 1."""
 Strength = float | list[float]
+
+
+def _as_pair(value: object) -> object:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
+    if pair[0] > pair[1]:
+        message = f"has to be [low, high], and {pair[0]:g} is above {pair[1]:g}; put them the other way round"
+        raise ValueError(message)
+    return pair
+
+
+Range = Annotated[tuple[Positive, Positive], BeforeValidator(_as_pair), AfterValidator(_ascending)]
+"""Two numbers above 0, the second not below the first, between which something is drawn."""
 
 
 class PlantScenario(ScenarioModel):
@@ -52,14 +67,9 @@ class DriveScenario(ScenarioModel):
     """Driving force: a sum of sines of random phase within a band, of this RMS."""
 
     rms_n: Positive = 60.0
-    band_hz: tuple[Positive, Positive] = (0.7, 6.0)
+    band_hz: Range = (0.7, 6.0)
     lines: Annotated[int, Field(ge=1, le=200)] = 12
     duration_s: Positive = 12.0
-
-    @field_validator("band_hz", mode="before")
-    @classmethod
-    def _as_pair(cls, value: object) -> object:
-        return tuple(value) if isinstance(value, list) else value
 
 
 class ColumnScenario(ScenarioModel):
@@ -77,11 +87,7 @@ class ColumnScenario(ScenarioModel):
     @field_validator("friction", "strength", mode="before")
     @classmethod
     def _as_pairs(cls, value: object) -> object:
-        return (
-            [tuple(pair) if isinstance(pair, list) else pair for pair in value]
-            if isinstance(value, list)
-            else value
-        )
+        return [_as_pair(pair) for pair in value] if isinstance(value, list) else value
 
     @model_validator(mode="after")
     def _ascending(self) -> Self:
@@ -98,7 +104,8 @@ class ColumnScenario(ScenarioModel):
 class ToldScenario(ScenarioModel):
     """How far the settings of a tap are from what `shots.csv` tells of them.
 
-    Velocity and mass are those told times 1 + error + scatter z, with z standard normal, anew for each shot.
+    Velocity and mass are those told times 1 + error + scatter z, with z standard normal, anew for each shot,
+    and again where that is not above 0.
     """
 
     velocity_error: Annotated[float, Field(gt=-1.0, lt=1.0)] = 0.0
@@ -128,7 +135,7 @@ class CampaignScenario(ScenarioModel):
     order: Literal["random", "as_listed"] = "random"
     stroke_m: Positive = 0.0015
     batches: list[Annotated[str, Field(min_length=1)]] = Field(["A"])
-    dwell_s: tuple[Positive, Positive] = (1.0, 150.0)
+    dwell_s: Range = (1.0, 150.0)
     friction_scatter: NotNegative = 0.012
     columns: dict[str, ColumnScenario] = Field({})
     ratio_scatter: NotNegative = 0.0
@@ -145,11 +152,6 @@ class CampaignScenario(ScenarioModel):
             message = "told is about taps: leave it out"
             raise ValueError(message)
         return self
-
-    @field_validator("dwell_s", mode="before")
-    @classmethod
-    def _as_pair(cls, value: object) -> object:
-        return tuple(value) if isinstance(value, list) else value
 
     @field_validator("velocities_mm_per_min", "speeds_m_s", "masses_kg", "directions", "starts_m", "batches")
     @classmethod

@@ -168,6 +168,46 @@ def test_number_of_shots_and_jitter() -> None:
     assert len({shot.plan.velocity for shot in shots}) == 7
 
 
+def test_the_directory_in_which_one_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file, here = on_disk(tmp_path, shots=1), tmp_path / "here"
+    (here / "below").mkdir(parents=True)
+    place = here.stat().st_ino
+    for directory in (here, here / "below"):  # `..` has `below` in it by then
+        monkeypatch.chdir(directory)
+        assert main(["campaign", str(file), "-o", "."]) == (2 if directory == here else 0)
+    assert sorted(part.name for part in here.iterdir()) == ["below", "below.truth.json"]
+    assert sorted(part.name for part in (here / "below").iterdir()) == [
+        "campaign.yaml",
+        "shots.csv",
+        "traces",
+    ]
+    assert here.stat().st_ino == place
+    assert len(read(Path()).shots) == 1, "a shell that stands there sees them"
+    assert main(["campaign", str(file), "-o", ".."]) == 2
+    assert main(["campaign", str(file), "-o", "/"]) == 2
+
+
+@pytest.mark.parametrize("told", ["velocity", "mass"])
+def test_scatter_of_what_is_told_keeps_it_above_zero(told: str, tmp_path: Path) -> None:
+    changed = {"told": {f"{told}_scatter": 0.9}, "shots": 12, "friction_scatter": 0.6, "ratio_scatter": 0.6}
+    truth = json.loads(write(scenario(**changed), tmp_path / "c").read_text())
+    for shot in truth["shots"]:
+        assert min(shot["velocity_over_told"], shot["mass_kg"], shot["mu_s"], shot["mu_k"]) > 0.0
+    over = [shot.plan for shot in make(scenario(**changed))[1]]
+    assert min(getattr(plan, f"{told}_over_told") for plan in over) < 0.5
+
+
+def test_what_never_came_to_zero_is_drawn_as_ever() -> None:
+    """As it always was for this seed: 1 + error + scatter z, of a generator of its own."""
+    told = {"velocity_error": 0.01, "velocity_scatter": 0.003, "mass_error": -0.02, "mass_scatter": 0.01}
+    _, shots = make(scenario(told=told, seed=9))
+    random = np.random.default_rng(np.random.SeedSequence(9).spawn(4)[3])
+    for shot in shots:
+        velocity, mass = random.standard_normal(2)
+        assert shot.plan.velocity_over_told == 1.0 + 0.01 + 0.003 * velocity
+        assert shot.plan.mass_over_told == 1.0 - 0.02 + 0.01 * mass
+
+
 def test_never_overwrites(tmp_path: Path) -> None:
     write(scenario(), tmp_path / "c")
     with pytest.raises(CampaignError, match="exists already"):
@@ -186,6 +226,9 @@ def test_never_overwrites(tmp_path: Path) -> None:
         ({"velocity": 3}, "unknown key 'velocity'"),
         ({"excitation": "push"}, "excitation: "),
         ({"format": 2}, "format: "),
+        ({"dwell_s": [150.0, 1.0]}, "dwell_s: has to be [low, high], and 150 is above 1"),
+        ({"dwell_s": [150.0]}, "'dwell_s[1]' is missing"),
+        ({"drive": {"band_hz": [6.0, 0.7]}}, "drive.band_hz: has to be [low, high], and 6 is above 0.7"),
         ({"sensors": {}}, "sensors: a campaign of excitation tap records force or position"),
         (
             {"excitation": "driven", "sensors": {"position": {"rate_hz": 1.0, "noise_std": 0.0}}},
