@@ -224,16 +224,28 @@ def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:
             f"rows; every row needs its time"
         )
         return None
-    back = np.flatnonzero(np.diff(time) <= 0.0) + 1
-    if back.size:
-        row = int(back[0])
-        faults.append(
-            f"{table.place(row)}: time does not increase: {column.values[row]:.9g} after "
-            f"{column.values[row - 1]:.9g} "
-            f"({back.size} such rows); several shots in one file need a column that numbers them"
-        )
+    steps = np.diff(time)
+    if (steps <= 0.0).any():
+        faults.append(_not_increasing(table, column, steps))
         return None
     return time
+
+
+def _not_increasing(table: Table, column: MeasuredColumn, steps: Samples) -> str:
+    """Tell times that go back, which several shots do, from times that only repeat, which rounding makes."""
+    goes_back = bool((steps < 0.0).any())
+    rows = np.flatnonzero(steps < 0.0 if goes_back else steps == 0.0) + 1
+    way_out = (
+        "several shots in one file need a column that numbers them (--column shot=NAME)"
+        if goes_back
+        else f"rounded times do so: export them with more digits, or say --column 'ignored={column.name}' "
+        f"--set rate=10kHz, with the rate of the recorder, where that is constant"
+    )
+    row = int(rows[0])
+    return (
+        f"{table.place(row)}: time does not increase: {column.values[row]:.9g} after "
+        f"{column.values[row - 1]:.9g} ({rows.size} such rows); {way_out}"
+    )
 
 
 def later_s(first: Record, second: Record) -> float:

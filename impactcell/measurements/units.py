@@ -49,7 +49,7 @@ class MeasuredUnit:
     offset: float = 0.0
 
 
-_PREFIXES = {"": 1.0, "n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6}
+_PREFIXES = {"": 1.0, "p": 1e-12, "n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "k": 1e3, "M": 1e6}
 """Prefixes of the SI that are met in records of machines, BIPM SI brochure (2019), table 7."""
 _SI = (
     ("s", Dimension.TIME, 1.0, "num"),
@@ -58,11 +58,11 @@ _SI = (
     ("N", Dimension.FORCE, 1.0, "umkM"),
     ("Nm", Dimension.TORQUE, 1.0, "umkM"),
     ("g", Dimension.MASS, 1e-3, "mk"),
-    ("Pa", Dimension.PRESSURE, 1.0, "kM"),
+    ("Pa", Dimension.PRESSURE, 1.0, "mkM"),
     ("bar", Dimension.PRESSURE, 1e5, "m"),
     ("Hz", Dimension.FREQUENCY, 1.0, "kM"),
     ("V", Dimension.VOLTAGE, 1.0, "um"),
-    ("A", Dimension.CURRENT, 1.0, "um"),
+    ("A", Dimension.CURRENT, 1.0, "pnum"),
 )
 """Symbol, dimension, factor, and the prefixes it is met with."""
 _POUND_KG, _INCH_M, _KILOPOND_N = 0.45359237, 0.0254, 9.80665
@@ -110,7 +110,7 @@ _WORDS = {
     "kn": "kN", "dan": "daN", "pa": "Pa", "mpa": "MPa", "hertz": "Hz", "kilohertz": "kHz",
     "megahertz": "MHz",
 }  # fmt: skip
-"""Other writings of a unit, in lower case."""
+"""Other writings of a unit, in lower case; of prefixes that case tells apart (mPa, MPa) `_SI` has both."""
 _RATES = {
     (Dimension.LENGTH, 1): Dimension.VELOCITY,
     (Dimension.LENGTH, 2): Dimension.ACCELERATION,
@@ -119,6 +119,8 @@ _RATES = {
 """What a dimension becomes over a power of time."""
 _SUFFIX_WORDS = {"n": "N", "nm": "nm", "v": "V", "a": "A", "k": "K", "hz": "Hz", "kn": "kN", "pa": "Pa"}
 """Units of a name in lower case, as in `force_n`, that lower case would hide."""
+_SPEED_SUFFIXES = (("m", "s"), ("mm", "s"), ("m", "min"), ("mm", "min"), ("rad", "s"))
+"""Ends of a name that are a speed and no time, as in velocity_mm_min."""
 
 _SEPARATORS = (" ?/ ?", " in ", ", ", " ", "_")
 """What stands between a name and its unit, in the order in which they are believed."""
@@ -240,7 +242,7 @@ def _suffix(text: str) -> tuple[str, str | None]:
         tail = parts[-count:]
         unit = "".join("/" if part == "per" else _SUFFIX_WORDS.get(part, part) for part in tail)
         unit = {"Nm": "Nm", "kgm2": "kgm2", "m/s": "m/s", "ms": "ms", "m/s2": "m/s2"}.get(unit, unit)
-        if count == 2 and tail in (["m", "s"], ["rad", "s"], ["mm", "s"]):
+        if tuple(tail) in _SPEED_SUFFIXES:
             unit = "/".join(tail)
         # What is called "u_in" goes in; where inches are meant, the name ends in "inch".
         if parse_unit(unit) and parts[0] and unit not in ("1", "t", "h", "in"):

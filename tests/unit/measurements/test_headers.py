@@ -64,6 +64,12 @@ def test_a_name_and_its_unit_come_apart_in_every_writing(name: str, writing: str
         ("velocity_mm/s", ("velocity", "mm/s")),
         ("position_mm", ("position", "mm")),
         ("velocity_mm_per_min", ("velocity", "mm/min")),
+        ("vel_mm_min", ("vel", "mm/min")),
+        ("velocity_m_min", ("velocity", "m/min")),
+        ("v_mm_s", ("v", "mm/s")),
+        ("omega_rad_s", ("omega", "rad/s")),
+        ("t_min", ("t", "min")),
+        ("Druck mPa", ("Druck", "mPa")),
         ("Ch 1/2", ("Ch 1/2", None)),
         ("Ch 1/2 / V", ("Ch 1/2", "V")),
         ("A/B", ("A/B", None)),
@@ -74,6 +80,38 @@ def test_a_name_and_its_unit_come_apart_in_every_writing(name: str, writing: str
 )
 def test_headers_that_may_be_read_in_two_ways(header: str, parts: tuple[str, str | None]) -> None:
     assert split_unit(header) == parts
+
+
+@pytest.mark.parametrize(
+    ("unit", "si"),
+    [
+        ("mPa", 1e-3), ("MPa", 1e6), ("mpa", 1e6), ("Mpa", 1e6), ("kPa", 1e3), ("mN", 1e-3), ("MN", 1e6),
+        ("mNm", 1e-3), ("MNm", 1e6), ("mbar", 100.0), ("MHz", 1e6), ("khz", 1e3), ("ms", 1e-3), ("mm", 1e-3),
+        ("nm", 1e-9), ("Nm", 1.0), ("pA", 1e-12), ("Pa", 1.0), ("mV", 1e-3), ("kN", 1e3), ("kn", 1e3),
+    ],
+)  # fmt: skip
+def test_prefixes_that_differ_in_case_alone_are_told_apart(unit: str, si: float) -> None:
+    """`mPa` was read as `MPa`, and `pA` as `Pa`; in lower case alone a megapascal is meant."""
+    known = parse_unit(unit)
+    assert known is not None
+    assert known.factor == pytest.approx(si, rel=1e-12, abs=0.0)
+
+
+@pytest.mark.parametrize("unit", ["Mm", "MS", "mHz", "Mbar", "MV", "NM"])
+def test_a_prefix_that_no_record_has_is_not_taken_for_another(unit: str) -> None:
+    assert parse_unit(unit) is None
+
+
+def test_a_column_called_by_the_unit_of_velocities_says_the_velocity(tmp_path: Path) -> None:
+    """`velocity_mm_min` was a column `velocity_mm` of minutes, and the velocity was not known."""
+    tap, rng = taps((3000,), (18.9,))[0], np.random.default_rng(3)
+    rows = [f"{t:.5f},{f:.5f},{1e3 * x:.6f},3000" for t, f, x in zip(*sampled(tap, rng), strict=True)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["time_s,force_n,position_mm,velocity_mm_min", *rows]), encoding="utf-8")
+    tables = read_tables(path)
+    mapping = guess(tables, read_given({"constants": ["mass=18.9kg", "stroke=1.5mm"]}))
+    (shot,) = make_campaign(tables, mapping).campaign.shots
+    assert shot.velocity_m_s == pytest.approx(0.05)
 
 
 def test_a_column_in_the_notation_of_din_says_the_velocity(tmp_path: Path) -> None:

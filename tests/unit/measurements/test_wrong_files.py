@@ -104,6 +104,26 @@ def test_a_time_that_stands_still_is_told_as_the_reason(tmp_path: Path) -> None:
     assert f"no column of time was found: 'time' goes forward in 0 of {len(rows) - 1} steps only" in told
 
 
+def test_times_that_were_rounded_are_told_from_several_shots(tmp_path: Path) -> None:
+    rounded = [f"{9e-4 * n:.3f},{f:.6g},{x:.7g}" for n, (f, x) in enumerate(zip(FORCE, PLACE, strict=True))]
+    content = "\n".join([HEAD, *rounded])
+    told = refused(tmp_path, content, *VELOCITY)
+    assert f"a.csv:7: time does not increase: 0.004 after 0.004 ({len(rounded) // 10} such rows)" in told
+    assert "rounded times do so: export them with more digits" in told
+    assert "shots" not in told
+    assert "--column 'ignored=time' --set rate=10kHz" in told, "the way out, which works"
+    out = run(tmp_path, content, *VELOCITY, "--column", "ignored=time", "--set", "rate=1111.1 Hz")
+    (shot,) = campaign.read(out).shots
+    assert shot.force is not None
+    assert np.diff(shot.force.time_s) == pytest.approx(9e-4, rel=1e-4)
+
+
+def test_times_that_go_back_are_those_of_several_shots(tmp_path: Path) -> None:
+    told = refused(tmp_path, "\n".join([text().rstrip(), *text().splitlines()[1:]]), *VELOCITY)
+    assert f"a.csv:{len(TIME) + 2}: time does not increase: 0 after {TIME[-1]:.9g} (1 such rows)" in told
+    assert "several shots in one file need a column that numbers them (--column shot=NAME)" in told
+
+
 def test_what_is_given_for_all_shots_goes_before_a_column_that_cannot_be(tmp_path: Path) -> None:
     out = run(tmp_path, text(f"{HEAD},mass_kg", -20), *VELOCITY, "--set", "mass=18.9kg")
     assert campaign.read(out).shots[0].mass_kg == 18.9
