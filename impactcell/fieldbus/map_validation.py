@@ -1,12 +1,19 @@
 """What a map file may say about a register: keys, types and ranges, every fault named."""
 
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
 from impactcell.fieldbus.map_registers import CONSTANTS
-from impactcell.fieldbus.register_types import BIT_TABLES, KINDS, SI_FACTOR, TABLES, WRITABLE_TABLES
+from impactcell.fieldbus.register_types import (
+    BIT_TABLES,
+    KINDS,
+    SI_FACTOR,
+    TABLES,
+    WRITABLE_TABLES,
+    code_range,
+)
 
 _ORDERS: Final = ("big", "little")
 MASK_WRITE, READ_WRITE = 22, 23
@@ -57,7 +64,7 @@ _KEYS: Final[Mapping[str, tuple[str, Callable[[Any], bool]]]] = {
     "offset": ("a number", _is_number),
     "scale": ("a number above 0", lambda value: _is_number(value) and value > 0.0),
     "unit": ("text", lambda value: isinstance(value, str)),
-    "not_a_number": ("a code", _is_int),
+    "not_a_number": ("a code of its type", _is_int),
     "saturation": ("two codes, the lower first", _is_saturation),
     "std": ("a number above 0", lambda value: _is_number(value) and value > 0.0),
     "expect": ("a whole number or text", lambda value: _is_int(value) or isinstance(value, str)),
@@ -167,7 +174,8 @@ def _entry_faults(entry: object, functions: list[int]) -> list[str]:
         return ["must be a mapping with at least address and type"]
     faults = [f"{key} is missing" for key in ("address", "type") if key not in entry]
     faults += _key_faults(entry, _KEYS)
-    return faults or [*_combination_faults(entry), *_bit_faults(entry, functions)]
+    faults = faults or [*_combination_faults(entry), *_bit_faults(entry, functions)]
+    return faults or [*_code_faults(entry), *_expect_faults(entry)]
 
 
 def _combination_faults(entry: Mapping[str, Any]) -> list[str]:
@@ -209,6 +217,54 @@ def _bit_faults(entry: Mapping[str, Any], functions: list[int]) -> list[str]:
                 f"a bit of a register is written by function {MASK_WRITE}, which is not in functions"
             )
     return faults
+
+
+def _code_faults(entry: Mapping[str, Any]) -> Iterator[str]:
+    """Say which codes a register of its type never shows."""
+    said = [("not_a_number", entry["not_a_number"])] if "not_a_number" in entry else []
+    said += [("saturation", code) for code in entry.get("saturation", ())]
+    if _is_plain(entry):
+        said += [("codes: key", code) for code in entry.get("codes", ())]
+    for key, code in said:
+        yield from _range_faults(key, code, entry["type"])
+
+
+def _expect_faults(entry: Mapping[str, Any]) -> Iterator[str]:
+    """Say why a register can never show what it must."""
+    expect, kind = entry.get("expect"), entry["type"]
+    if expect is None:
+        return
+    if entry.get("count", 1) > 1:
+        yield "expect belongs to a single value"
+    elif (kind == "string") != isinstance(expect, str):
+        yield f"expect must be {'text, in quotes' if kind == 'string' else 'a whole number'}, not {expect!r}"
+    elif isinstance(expect, str):
+        size, room = len(expect.encode(errors="replace")), 2 * entry["length"]
+        if size > room:
+            yield f"expect has {size} bytes, {entry['length']} registers hold {room}"
+        elif expect != expect.rstrip() or "\0" in expect:
+            yield f"expect must end without a space and have no NUL, not {expect!r}: it is read up to there"
+    elif _is_plain(entry):
+        yield from _range_faults("expect", expect, "bit" if "bit" in entry else kind)
+
+
+def _is_plain(entry: Mapping[str, Any]) -> bool:
+    """Whether what an entry shows is its code."""
+    return not entry.get("unit") and entry.get("scale", 1.0) == 1.0 and not entry.get("offset")
+
+
+def _range_faults(key: str, code: int, kind: str) -> Iterator[str]:
+    """Say that no register of a type shows a code, and which one its bits mean there."""
+    shown = code_range(kind)
+    if shown is None or shown[0] <= code <= shown[1]:
+        return
+    least, most = shown
+    meant, values = "", 2 ** (8 * KINDS[kind].itemsize)
+    if kind.startswith("bcd"):
+        meant = "; a code with a digit above 9 is no number anyway" if key == "not_a_number" else ""
+    elif kind != "bit" and key != "saturation" and -values // 2 <= code < values:
+        meant = f"; write {(code - least) % values + least}"
+    yield f"{key} {code} is outside of {kind}, {least} to {most}{meant}"
 
 
 def _arguments(name: str, entry: Mapping[str, Any], order: str) -> dict[str, Any]:

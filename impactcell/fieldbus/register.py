@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from impactcell.errors import MapError, NotDecimalError
 from impactcell.fieldbus.bcd import NO_BCD, from_bcd, to_bcd
-from impactcell.fieldbus.register_types import KINDS, SI_FACTOR, WIRE
+from impactcell.fieldbus.register_types import KINDS, SI_FACTOR, WIRE, code_range
 
 Words = NDArray[np.uint16]
 Value = int | float | str | NDArray[Any]
@@ -253,13 +253,10 @@ class Register:
         return self._in_order(np.array([1 << self.bit], dtype=WIRE))
 
     def _codes(self, values: NDArray[Any]) -> NDArray[Any]:
-        dtype = KINDS[self.kind]
-        if dtype.kind == "f":
+        dtype, codes_of_type = KINDS[self.kind], code_range(self.kind)
+        if codes_of_type is None:
             return ((values.astype(np.float64) - self.si_offset) / self.si_factor).astype(dtype)
-        info = np.iinfo(dtype)
-        least, most = (0, 10 ** (2 * dtype.itemsize) - 1) if self._is_bcd else (info.min, info.max)
-        if self.kind == "bit":
-            most = 1
+        least, most = codes_of_type
         if values.dtype.kind in "iu" and self.is_code:  # exact: u64 does not pass through a float
             if values.size and (int(values.min()) < least or int(values.max()) > most):
                 raise MapError(f"register {self.name}: value outside {least}..{most}")

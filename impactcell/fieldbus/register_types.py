@@ -55,3 +55,19 @@ KINDS: Final[Mapping[str, np.dtype[Any]]] = {
 }
 """Numeric types of a register; `string` is the other one. A `bit` is a coil or a discrete input: in blocks of
 words it is one of them, 0 or 1."""
+
+
+def code_range(kind: str) -> tuple[int, int] | None:
+    """Return the least and the largest code of a type; None of floating-point numbers and of text.
+
+    >>> code_range("i16"), code_range("bcd16"), code_range("f32")
+    ((-32768, 32767), (0, 9999), None)
+    """
+    if kind == "bit":
+        return 0, 1
+    if kind == "string" or KINDS[kind].kind == "f":
+        return None
+    if kind.startswith("bcd"):
+        return 0, 10 ** (2 * KINDS[kind].itemsize) - 1
+    limits = np.iinfo(KINDS[kind])
+    return int(limits.min), int(limits.max)

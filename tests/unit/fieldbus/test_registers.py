@@ -217,6 +217,92 @@ def test_a_bad_map_is_refused_with_its_register(
     assert message in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("name", "entry", "message"),
+    [
+        (
+            "force",
+            {"not_a_number": 0x8000},
+            "force: not_a_number 32768 is outside of i16, -32768 to 32767; write -32768",
+        ),
+        (
+            "position",
+            {"not_a_number": 0x80000000},
+            "not_a_number 2147483648 is outside of i32, -2147483648 to 2147483647; write -2147483648",
+        ),
+        (
+            "actuator",
+            {"type": "u32", "not_a_number": -1, "saturation": [0, 9]},
+            "to 4294967295; write 4294967295",
+        ),
+        ("force", {"not_a_number": 70_000}, "not_a_number 70000 is outside of i16, -32768 to 32767"),
+        ("force", {"saturation": [0, 65_535]}, "saturation 65535 is outside of i16, -32768 to 32767"),
+        (
+            "force",
+            {"type": "bcd16", "saturation": [0, 9999], "not_a_number": 0xFFFF},
+            "65535 is outside of bcd16, 0 to 9999; a code with a digit above 9 is no number anyway",
+        ),
+        ("map_version", {"expect": 70_000}, "map_version: expect 70000 is outside of u16, 0 to 65535"),
+        ("map_version", {"expect": -1}, "expect -1 is outside of u16, 0 to 65535; write 65535"),
+        ("map_version", {"expect": "1"}, "expect must be a whole number, not '1'"),
+        ("module_name", {"expect": 7}, "expect must be text, in quotes, not 7"),
+        ("module_name", {"expect": "IMPACT-FPGA-TWIN1"}, "expect has 17 bytes, 8 registers hold 16"),
+        (
+            "module_name",
+            {"expect": "IMPACT "},
+            "expect must end without a space and have no NUL, not 'IMPACT '",
+        ),
+        ("ring_cycle", {"expect": 1}, "ring_cycle: expect belongs to a single value"),
+        (
+            "extra",
+            {"address": 9, "type": "bit", "table": "coil", "expect": 2},
+            "extra: expect 2 is outside of bit, 0 to 1",
+        ),
+        (
+            "extra",
+            {"address": 112, "type": "u16", "bit": 3, "expect": 8},
+            "expect 8 is outside of bit, 0 to 1",
+        ),
+        (
+            "state",
+            {"codes": {0: "idle", 65_536: "moving"}},
+            "state: codes: key 65536 is outside of u16, 0 to 65535",
+        ),
+        (
+            "extra",
+            {"address": 112, "type": "i16", "codes": {0xFFFF: "gone"}},
+            "codes: key 65535 is outside of i16",
+        ),
+    ],
+)
+def test_a_code_that_a_register_never_shows_is_refused(
+    declaration: dict[str, Any], name: str, entry: dict[str, Any], message: str
+) -> None:
+    """It matched nothing: a lost sample was one of -819.2 N."""
+    with pytest.raises(MapError, match="register map fpga-v1") as caught:
+        RegisterMap.from_mapping(changed(declaration, name, **entry))
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "entry"),
+    [
+        ("force", {"saturation": [-32_768, 32_767]}),
+        ("map_version", {"expect": 65_535}),
+        ("module_name", {"expect": "IMPACT-FPGA-TWIN"}),
+        ("state", {"codes": {0: "idle", 65_535: "none"}}),
+        ("extra", {"address": 112, "type": "f32", "expect": 70_000}),
+        ("extra", {"address": 112, "type": "u16", "unit": "mm", "expect": 70_000}),
+        ("extra", {"address": 112, "type": "i16", "unit": "mm", "codes": {70_000: "gone"}}),
+        ("extra", {"address": 112, "type": "u16", "bit": 15, "expect": 1}),
+    ],
+)
+def test_a_code_at_the_end_of_its_type_is_one(
+    declaration: dict[str, Any], name: str, entry: dict[str, Any]
+) -> None:
+    assert RegisterMap.from_mapping(changed(declaration, name, **entry))
+
+
 @pytest.mark.parametrize("name", REQUIRED)
 def test_a_missing_register_is_named(declaration: dict[str, Any], name: str) -> None:
     copied = copy.deepcopy(declaration)
