@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
+from impactcell.fieldbus.register_types import code_range
 from impactcell.fieldbus.registers import RegisterMap
 
 SHOWN: Final = (
@@ -13,6 +14,10 @@ SHOWN: Final = (
 PARAMETERS: Final = ("command_velocity", "command_stroke", "command_direction")
 """Registers that a tap is written to; then `command_sequence` has it made."""
 COMMAND: Final = (*PARAMETERS, "command_sequence")
+_NUMBERED: Final = ("command_sequence", "command_accepted")
+"""Registers that show the number of a command."""
+_MOST_COMMANDS: Final = 2**32 - 1
+"""Number of a command, at most; a wider register shows no larger one."""
 READY: Final = "ready"
 """Code of `positioning_state` of a module that takes a command."""
 EXECUTING, DONE = "executing", "done"
@@ -32,3 +37,9 @@ def not_placing(registers: RegisterMap) -> Iterator[str]:
                 yield f"no code of register {name} is called `{word}`: every tap would be refused"
     if not missing and "command_abort" not in registers:
         yield "no register command_abort: a tap that is executed cannot be aborted"
+
+
+def last_sequence(registers: RegisterMap) -> int:
+    """Return the largest number of a command that the registers of a positioning cell show; then comes 1."""
+    ranges = (code_range(registers[name].kind) for name in _NUMBERED)
+    return min(_MOST_COMMANDS, *(most for _, most in filter(None, ranges)))

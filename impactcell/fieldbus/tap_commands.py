@@ -13,7 +13,14 @@ from typing import Final
 
 from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, PositioningError, ProtocolError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
-from impactcell.fieldbus.positioning_registers import COMMAND, DONE, EXECUTING, PARAMETERS, READY
+from impactcell.fieldbus.positioning_registers import (
+    COMMAND,
+    DONE,
+    EXECUTING,
+    PARAMETERS,
+    READY,
+    last_sequence,
+)
 from impactcell.fieldbus.status_block import PositioningStatus
 
 _POLL_S: Final = 0.005
@@ -77,7 +84,7 @@ class TapCommander:
                         )
                     await self._write_parameters(command)
                     commanded = True
-                    sequence = before.accepted_command % (2**32 - 1) + 1
+                    sequence = before.accepted_command % last_sequence(self._module.registers) + 1
                     return await self._execute(session, sequence, is_wanted)
             except TimeoutError:
                 struck = "the part may have been struck" if commanded else "nothing has been commanded"

@@ -183,7 +183,7 @@ NAMED_FAULTS: Final = (
     NamedFault(
         "command sequence does not wrap",
         "impactcell/fieldbus/tap_commands.py",
-        "before.accepted_command % (2**32 - 1) + 1",
+        "before.accepted_command % last_sequence(self._module.registers) + 1",
         "before.accepted_command + 1",
         ("tests/unit/fieldbus/test_tap_commands.py",),
     ),

@@ -5,6 +5,7 @@ import contextlib
 import math
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -131,6 +132,34 @@ async def test_the_command_after_the_last_number_is_the_first_and_never_none(fpg
         for cycle in (1, 2):
             assert await positioner.tap(COMMAND) == cycle
     assert numbers == [2**32 - 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("written", "shown", "last"),
+    [
+        ("u16", "u16", 65_535),
+        ("bcd16", "bcd16", 9999),
+        ("i16", "i16", 32_767),
+        ("u32", "u16", 65_535),
+        ("u32", "bcd16", 9999),
+        ("u64", "u64", 2**32 - 1),
+    ],
+)
+async def test_numbers_of_commands_begin_anew_where_the_narrower_register_ends(
+    fpga: RegisterMap, written: str, shown: str, last: int
+) -> None:
+    """Each task ended with a value outside of the register, or waited for a number that cannot be shown."""
+    kinds = {"command_sequence": written, "command_accepted": shown}
+    moved = {name: replace(fpga[name], kind=kind, address=60_000) for name, kind in kinds.items()}
+    moved["command_accepted"] = replace(moved["command_accepted"], address=60_010)
+    narrow = replace(fpga, registers={**fpga.registers, **moved})
+    device, numbers = PositioningDevice(narrow), []
+    device.put("command_accepted", last - 1)
+    device.on_command = lambda: numbers.append(int(device.get("command_accepted")))
+    async with ready(narrow, device) as (_, _, positioner):
+        for cycle in (1, 2, 3):
+            assert await positioner.tap(COMMAND) == cycle
+    assert numbers == [last, 1, 2]
 
 
 async def test_an_answer_lost_with_the_connection_does_not_repeat_the_tap(fpga: RegisterMap) -> None:
