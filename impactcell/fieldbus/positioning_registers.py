@@ -1,10 +1,12 @@
 """What a register map has to have, and to call by name, for the module of a cell that places parts."""
 
+import math
 from collections.abc import Iterator
 from typing import Final
 
 from impactcell.fieldbus.register_types import code_range
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.numerics.raster import ANY_VALUE, NEARLY_EQUAL, Raster
 
 SHOWN: Final = (
     "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
@@ -37,6 +39,18 @@ def not_placing(registers: RegisterMap) -> Iterator[str]:
                 yield f"no code of register {name} is called `{word}`: every tap would be refused"
     if not missing and "command_abort" not in registers:
         yield "no register command_abort: a tap that is executed cannot be aborted"
+
+
+def commanded_values(registers: RegisterMap, name: str) -> Raster:
+    """Return the values above 0 that can be commanded through a register, SI: any through one of floats."""
+    register = registers.registers.get(name)
+    codes = None if register is None else register.saturation or code_range(register.kind)
+    if register is None or codes is None:
+        return ANY_VALUE
+    least, most = codes
+    first = max(least, math.floor(NEARLY_EQUAL - register.offset / register.scale) + 1)
+    at_zero, step = register.si_offset, register.si_factor
+    return Raster(step, at_zero + first * step, at_zero + most * step)
 
 
 def last_sequence(registers: RegisterMap) -> int:

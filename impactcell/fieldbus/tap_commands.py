@@ -25,6 +25,8 @@ from impactcell.fieldbus.status_block import PositioningStatus
 
 _POLL_S: Final = 0.005
 """Between two looks at the outcome of a tap, seconds: a tenth of the shortest tap and slide."""
+_ROUNDING: Final = 1e-6
+"""Share by which a register of floats may miss what is commanded: an f32 does so by less than 1e-7."""
 _REFUSALS: Final = frozenset({1, 2, 3})
 """Exception codes of a request that will never do (function, address, value); all others may pass."""
 
@@ -36,6 +38,11 @@ class TapCommand:
     velocity_m_s: float
     stroke_m: float
     direction: int
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """What is written to which register, SI."""
+        return dict(zip(PARAMETERS, (self.velocity_m_s, self.stroke_m, self.direction), strict=True))
 
 
 class TapCommander:
@@ -148,6 +155,14 @@ class TapCommander:
             raise PositioningError(f"{cell}: tap stroke must be above 0, not {command.stroke_m} m")
         if command.direction not in (-1, 1):
             raise PositioningError(f"{cell}: tap direction must be 1 or -1, not {command.direction}")
+        for name, value in command.parameters.items():
+            register = self._module.registers[name]
+            shown = register.decode(register.encode(value))
+            if not (isinstance(shown, int | float) and math.isclose(shown, value, rel_tol=_ROUNDING)):
+                raise PositioningError(
+                    f"{cell}: register {name} ({register.address}) cannot express {value:g}, it would show "
+                    f"{shown:g}; nothing has been commanded"
+                )
 
     async def _read_positioning(self) -> tuple[int, PositioningStatus]:
         """Return session and a fresh report, waiting for the link if it is down."""
@@ -166,10 +181,7 @@ class TapCommander:
 
     async def _write_parameters(self, command: TapCommand) -> None:
         """Write the parameters and read them back."""
-        registers = self._module.registers
-        parameters = dict(
-            zip(PARAMETERS, (command.velocity_m_s, command.stroke_m, command.direction), strict=True)
-        )
+        registers, parameters = self._module.registers, command.parameters
         codes = {name: registers[name].encode(value) for name, value in parameters.items()}
         while True:
             await self._module.wait_connected()

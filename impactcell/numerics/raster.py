@@ -1,5 +1,8 @@
 """The raster on which rounded values lie: an integer code's step, or the last decimal that was written."""
 
+import math
+from typing import Final, NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +14,36 @@ MAX_OFF = 0.2
 """Share of a step by which a difference may miss the raster: a code that was scaled and rounded once more."""
 FEWEST_STEPS = 3
 """Differences of neighbouring values from which on a raster shows."""
+
+
+class Raster(NamedTuple):
+    """Values that are whole steps apart, from `first` to `last`; with a step of 0 any value is one."""
+
+    step: float = 0.0
+    first: float = 0.0
+    last: float = math.inf
+
+    def at_most(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Give the largest of the raster that is at most each of some rising values, without those below all.
+
+        Where all of them are, it is the first of the raster. What is given is never above what was asked for.
+
+        Examples
+        --------
+        >>> Raster(0.5, 1.0, 3.0).at_most(np.array([0.9, 1.2, 1.4, 2.6, 9.0])).tolist()
+        [1.0, 2.5, 3.0]
+        """
+        if not self.step:
+            return values
+        steps = np.floor((np.minimum(values, self.last) - self.first) / self.step + NEARLY_EQUAL)
+        _, once = np.unique(steps, return_index=True)
+        reached: NDArray[np.float64] = np.minimum(self.first + self.step * steps, values)[once][
+            steps[once] >= 0.0
+        ]
+        return reached if reached.size else np.array([self.first])
+
+
+ANY_VALUE: Final = Raster()
 
 
 def raster_of(values: NDArray[np.float64]) -> float | None:

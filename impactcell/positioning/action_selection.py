@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from impactcell.numerics.jit import compiled
+from impactcell.numerics.raster import Raster
 from impactcell.positioning.displacement_quantiles import Scenarios, displacement_quantiles
 from impactcell.positioning.dynamic_programming import (
     AIMS,
@@ -21,11 +22,16 @@ FINE = 11  # strokes tried between the neighbours of one of them, and again betw
 
 
 class ActionSpace(NamedTuple):
-    """Velocities and strokes of the table, and the longest stroke allowed at each velocity; SI."""
+    """Velocities and strokes of the table, and the longest stroke allowed at each velocity; SI.
+
+    Between those of the table there are those of the rasters.
+    """
 
     velocities: Samples
     strokes: Samples
     longest_strokes: Samples
+    velocity_raster: Raster
+    stroke_raster: Raster
 
 
 class SelectedAction(NamedTuple):
@@ -153,17 +159,20 @@ def select_action(
                     )
                 if fine.size < 3 or costs[n] == math.inf:
                     break
-                fine = np.linspace(fine[max(n - 1, 0)], fine[min(n + 1, fine.size - 1)], FINE)
+                between = np.linspace(fine[max(n - 1, 0)], fine[min(n + 1, fine.size - 1)], FINE)
+                fine = space.stroke_raster.at_most(between)
     return best, least
 
 
 def _neighbours(i: int, place: float, space: ActionSpace) -> list[tuple[float, Samples]]:
     """Where to look more closely: strokes about `place`, or velocities where there is no stroke to choose."""
-    velocities, strokes, longest = space
+    velocities, strokes, longest = space.velocities, space.strokes, space.longest_strokes
     if strokes.size == 1:
         above = min(i + 1, velocities.size - 1)
         high = velocities[above] if longest[above] >= strokes[0] else velocities[i]
-        return [(float(v), strokes) for v in np.linspace(velocities[max(i - 1, 0)], high, 2 * FINE + 1)]
+        between = np.linspace(velocities[max(i - 1, 0)], high, 2 * FINE + 1)
+        return [(float(v), strokes) for v in space.velocity_raster.at_most(between)]
     low = strokes[max(math.ceil(place) - 1, 0)]
     high = strokes[min(math.floor(place) + 1, strokes.size - 1)]
-    return [(float(velocities[i]), np.linspace(low, min(high, longest[i]), FINE))]
+    between = np.linspace(low, min(high, longest[i]), FINE)
+    return [(float(velocities[i]), space.stroke_raster.at_most(between))]

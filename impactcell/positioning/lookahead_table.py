@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from impactcell.errors import PositioningError
+from impactcell.numerics.raster import ANY_VALUE, Raster
 from impactcell.positioning.action_selection import ActionSpace
 from impactcell.positioning.displacement_discrepancy import FEATURES, MASS_KG, POSITION_M
 from impactcell.positioning.displacement_quantiles import (
@@ -58,6 +60,18 @@ class PlannerLimits:
     max_stroke_m: float
     max_force_n: float
     overshoot_probability: float
+    velocity_raster: Raster = ANY_VALUE
+    stroke_raster: Raster = ANY_VALUE
+
+    def __post_init__(self) -> None:
+        """Refuse what no cell can have."""
+        for name in ("tolerance_m", "max_velocity_m_s", "max_stroke_m", "max_force_n"):
+            if not getattr(self, name) > 0.0:
+                raise PositioningError(f"tap planner: {name} must be positive, not {getattr(self, name)}")
+        if not 0.0 < self.overshoot_probability < 1.0:
+            raise PositioningError(
+                f"tap planner: overshoot_probability lies between 0 and 1, not {self.overshoot_probability}"
+            )
 
     def penalty(self, caution: float) -> float:
         """Taps that an overshoot may cost."""
@@ -67,7 +81,8 @@ class PlannerLimits:
     def velocities(self) -> Samples:
         """Velocities of the table; denser where there is no stroke to choose."""
         count = VELOCITIES * (8 if math.isinf(self.max_stroke_m) else 1)
-        return np.geomspace(min(SLOWEST_M_S, 0.5 * self.max_velocity_m_s), self.max_velocity_m_s, count)
+        slowest = min(SLOWEST_M_S, 0.5 * self.max_velocity_m_s)
+        return self.velocity_raster.at_most(np.geomspace(slowest, self.max_velocity_m_s, count))
 
     def strokes(self, indentation_m: float) -> Samples:
         """Strokes of the table, finer about the indentation of the part, where it only just moves."""
@@ -75,7 +90,8 @@ class PlannerLimits:
             return np.array([math.inf])
         low, high = (min(multiple * indentation_m, 0.5 * self.max_stroke_m) for multiple in NEAR)
         near = np.linspace(0.5 * low, high, NEAR_STROKES, endpoint=False)
-        return np.concatenate([near, np.geomspace(high, self.max_stroke_m, FAR_STROKES)])
+        far = np.geomspace(high, self.max_stroke_m, FAR_STROKES)
+        return self.stroke_raster.at_most(np.concatenate([near, far]))
 
     def goal(self, caution: float) -> Goal:
         """Tolerance, and what an overshoot may cost."""
@@ -90,7 +106,8 @@ class PlannerLimits:
     def space(self, posterior: PlannerPosterior, part: Samples, strokes: Samples) -> ActionSpace:
         """Taps to choose from."""
         velocities = self.velocities
-        return ActionSpace(velocities, strokes, self.longest_strokes(velocities, posterior, part))
+        longest = self.longest_strokes(velocities, posterior, part)
+        return ActionSpace(velocities, strokes, longest, self.velocity_raster, self.stroke_raster)
 
 
 class Knowledge(NamedTuple):
@@ -218,7 +235,7 @@ def build_lookahead(
         later = anticipate_learning(posterior)
         will_learn = (np.diag(posterior.cov) > 1.2 * np.diag(later.cov)).any()
         ahead = _quantiles(limits, strokes, later, part, place) if will_learn else table
-        if math.isinf(limits.max_stroke_m):
+        if strokes.size == 1:
             ahead = np.ascontiguousarray(ahead.swapaxes(0, 1))  # neighbours are velocities, not strokes
         outlook = Outlook(knowledge, ahead)
     shares = _shares(strokes, indentation, table[:, :, COARSE_Z.size // 2])

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from impactcell.errors import PositioningError
+from impactcell.numerics.raster import ANY_VALUE, Raster
 from impactcell.physics import Plant, free_motion
 from impactcell.positioning import model_hypotheses
 from impactcell.positioning.action_selection import select_action
@@ -64,6 +65,8 @@ class TapPlanner:
         Contact force that no tap may exceed.
     two_sided : bool
         Actuators on both ends: a part that went too far is struck back.
+    velocity_raster, stroke_raster : Raster
+        Velocities (m/s) and strokes (m) that can be commanded; no other tap is planned.
 
     Raises
     ------
@@ -78,6 +81,8 @@ class TapPlanner:
     plant: Plant | Mapping[str, float] | None = None
     max_force_n: float = math.inf
     two_sided: bool = False
+    velocity_raster: Raster = ANY_VALUE
+    stroke_raster: Raster = ANY_VALUE
     _posterior: PlannerPosterior = field(init=False, repr=False)
     _gravity: float = field(init=False, repr=False)
     _limits: PlannerLimits = field(init=False, repr=False)
@@ -88,23 +93,16 @@ class TapPlanner:
 
     def __post_init__(self) -> None:
         """Refuse what no cell can have, and start from the nominal plant."""
-        for name in ("tolerance_m", "max_velocity_m_s", "max_stroke_m", "max_force_n"):
-            if not getattr(self, name) > 0.0:
-                raise PositioningError(f"tap planner: {name} must be positive, not {getattr(self, name)}")
-        if not 0.0 < self.overshoot_probability < 1.0:
-            raise PositioningError(
-                f"tap planner: overshoot_probability lies between 0 and 1, not {self.overshoot_probability}"
-            )
+        self._limits = PlannerLimits(
+            self.tolerance_m, self.max_velocity_m_s, self.max_stroke_m, self.max_force_n,
+            self.overshoot_probability, self.velocity_raster, self.stroke_raster,
+        )  # fmt: skip
         plant = self.plant
         if plant is None:
             plant = Plant(stiffness_n_per_m=6.5e5, damping_n_s_per_m=465.0, mu_s=0.25, mu_k=0.19)
         elif isinstance(plant, Mapping):
             plant = Plant(**plant)  # type: ignore[arg-type]
         self._gravity = plant.gravity_m_s2
-        self._limits = PlannerLimits(
-            self.tolerance_m, self.max_velocity_m_s, self.max_stroke_m, self.max_force_n,
-            self.overshoot_probability,
-        )  # fmt: skip
         compile_planning()
         self._posterior = model_hypotheses.prior(
             plant.stiffness_n_per_m,

@@ -11,6 +11,8 @@ from impactcell.cell import CellDesign
 from impactcell.cell.preprocessing import CaptureDefaults
 from impactcell.errors import PositioningError
 from impactcell.fieldbus.link import ModuleLink, SerialLine, TlsFiles
+from impactcell.fieldbus.positioning_registers import commanded_values
+from impactcell.fieldbus.registers import RegisterMap
 from impactcell.journal.retention import Retention
 from impactcell.positioning import SafetyLimits, TapPlanner, task_state_machine
 from impactcell.records import MM_PER_MIN
@@ -205,9 +207,12 @@ def positioning_cell(cell: CellConfig) -> task_state_machine.PositioningCell:
 
 
 def tap_planner(
-    cell: CellConfig, limited: task_state_machine.PositioningCell, design: CellDesign
+    cell: CellConfig,
+    limited: task_state_machine.PositioningCell,
+    design: CellDesign,
+    registers: RegisterMap,
 ) -> TapPlanner:
-    """Make the planner of a cell, which has learned nothing yet."""
+    """Make the planner of a cell, which has learned nothing yet: of taps that `registers` can express."""
     settings, limits = cell.settings.positioning, limited.limits
     assert settings is not None  # noqa: S101 - `positioning_cell` has looked
     return TapPlanner(
@@ -218,4 +223,6 @@ def tap_planner(
         plant=design.model.plant,
         max_force_n=limits.force_n,
         two_sided=limited.two_sided,
+        velocity_raster=commanded_values(registers, "command_velocity"),
+        stroke_raster=commanded_values(registers, "command_stroke"),
     )

@@ -53,7 +53,7 @@ class PositioningTask:
     ) -> None:
         self._log = CellLogger(logging.getLogger(__name__), cell.name)
         self._cell = positioning_cell(cell)
-        self._planner = tap_planner(cell, self._cell, design)
+        self._planner = tap_planner(cell, self._cell, design, module.registers)
         if worker.belief is not None:
             self._planner.resume(worker.belief)
         self._design = design
@@ -150,7 +150,7 @@ class PositioningTask:
         def replan() -> None:
             limits = positioning_cell(cell)
             if limits != self._cell:
-                planner = tap_planner(cell, limits, design)
+                planner = tap_planner(cell, limits, design, self._module.registers)
                 planner.resume(self._planner.posterior)
                 self._cell, self._planner = limits, planner
             if another_plant:

@@ -23,6 +23,7 @@ from impactcell.process.yaml_loader import FilePosition
 from impactcell.records import MM_PER_MIN
 from impactcell.scada.users import read_users
 from impactcell.settings.cells import CellConfig
+from impactcell.settings.commanded_taps import doubted_commands
 from impactcell.settings.plausible_tap import doubted_values, immovable
 
 STROKE_TOLERANCE: Final = 0.01
@@ -250,6 +251,8 @@ def _of_map(cell: CellConfig) -> Iterator[_Remark]:
         yield _Remark(("module", "register_map"), f"{registers.name}: {text}", is_fault=False)
     for text in not_placing(registers) if cell.settings.positioning is not None else ():
         yield _Remark(("positioning",), f"register map {registers.name}: {text}")
+    for place, text, is_fault in doubted_commands(cell):
+        yield _Remark(place, text, is_fault)
     stroke_mm = cell.settings.actuator.stroke_mm
     for name, section, key, value, unit, scale in (
         ("mass", "part", "mass_kg", cell.settings.part.mass_kg, "kg", 1.0),

@@ -6,6 +6,7 @@ import math
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -292,6 +293,52 @@ async def test_impossible_taps_are_refused_before_anything_is_written(
         with pytest.raises(PositioningError, match="cell-1: tap"):
             await positioner.tap(command)
     assert device.taps == []
+
+
+def coarse(fpga: RegisterMap, **changed: Any) -> RegisterMap:
+    """Commands through whole numbers, as a PLC may have them: 1 mm/s and 0.1 mm."""
+    velocity = replace(fpga["command_velocity"], kind="u16", unit="mm/s")
+    stroke = replace(fpga["command_stroke"], kind="u16", scale=0.1)
+    moved = {"command_velocity": replace(velocity, **changed), "command_stroke": stroke}
+    return replace(fpga, registers={**fpga.registers, **moved})
+
+
+@pytest.mark.parametrize(
+    ("command", "told"),
+    [
+        (
+            TapCommand(0.0996, 0.0014, 1),
+            r"command_velocity \(140\) cannot express 0\.0996, it would show 0\.1;",
+        ),
+        (TapCommand(0.0124, 0.0014, 1), r"cannot express 0\.0124, it would show 0\.012;"),
+        (TapCommand(0.0004, 0.0014, 1), r"cannot express 0\.0004, it would show 0;"),
+        (TapCommand(70.0, 0.0014, 1), r"cannot express 70, it would show 65\.535;"),
+        (
+            TapCommand(0.1, 0.00146, 1),
+            r"command_stroke \(142\) cannot express 0\.00146, it would show 0\.0015;",
+        ),
+        (TapCommand(0.1, 0.00004, 1), r"command_stroke \(142\) cannot express 4e-05, it would show 0;"),
+    ],
+)
+async def test_a_tap_that_its_registers_round_or_clip_is_not_commanded(
+    fpga: RegisterMap, command: TapCommand, told: str
+) -> None:
+    """It was struck faster and farther than the limits of the cell allow, and the read-back agreed."""
+    registers = coarse(fpga)
+    device = PositioningDevice(registers)
+    async with ready(registers, device) as (_, _, positioner):
+        with pytest.raises(PositioningError, match=told + " nothing has been commanded"):
+            await positioner.tap(command)
+        assert device.get("command_velocity") == 0.0
+        assert await positioner.tap(TapCommand(0.1, 0.0015, 1)) == 1
+    assert device.taps == [(pytest.approx(0.1), pytest.approx(0.0015), 1)]
+
+
+async def test_a_tap_beyond_the_saturation_of_its_register_is_not_commanded(fpga: RegisterMap) -> None:
+    registers = coarse(fpga, saturation=(0, 90))
+    async with ready(registers, PositioningDevice(registers)) as (_, _, positioner):
+        with pytest.raises(PositioningError, match=r"cannot express 0\.1, it would show 0\.09"):
+            await positioner.tap(TapCommand(0.1, 0.0014, 1))
 
 
 async def test_a_map_without_positioning_is_said(fpga: RegisterMap) -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from impactcell.errors import PositioningError
+from impactcell.numerics.raster import Raster
 from impactcell.physics import Plant
 from impactcell.positioning import Tap, TapPlanner, Unreachable
 from impactcell.positioning.planner import MOST_STILL
@@ -115,6 +116,41 @@ def test_limits_hold() -> None:
             assert planner.force(tap, mass) <= 160.0 * (1.0 + 1e-9)
             assert tap.lowest_m <= tap.expected_m <= tap.highest_m
             assert tap.overshoot_probability <= 1e-3
+
+
+@pytest.mark.parametrize(("velocity_step", "stroke_step"), [(1e-3, 20e-6), (10e-3, 100e-6), (50e-3, 1.5e-3)])
+def test_taps_are_planned_of_what_can_be_commanded(velocity_step: float, stroke_step: float) -> None:
+    """They were planned between the codes of the registers, and rounded up beyond limits when commanded."""
+    planner = TapPlanner(
+        tolerance_m=50e-6, plant=NOMINAL, max_velocity_m_s=0.0996, max_stroke_m=1.56e-3,
+        velocity_raster=Raster(velocity_step, velocity_step, 1.0),
+        stroke_raster=Raster(stroke_step, stroke_step, 1.0),
+    )  # fmt: skip
+    rng, plant, made = np.random.default_rng(8), Plant(7e5, 430.0, 0.22, 0.76 * 0.22), []
+    for mass in (6.0, 18.0, 35.0):
+        taps, remaining, last = deliver(planner, plant, mass, 12e-3, rng)
+        assert remaining >= -50e-6
+        assert (last is None) == (abs(remaining) <= 50e-6)
+        made += taps
+    assert made
+    for tap in made:
+        for value, step, limit in (
+            (tap.velocity_m_s, velocity_step, 0.0996),
+            (tap.stroke_m, stroke_step, 1.56e-3),
+        ):
+            assert round(value / step) >= 1
+            assert value == pytest.approx(step * round(value / step), rel=1e-8)
+            assert value <= limit
+        assert tap.overshoot_probability <= 1e-3
+
+
+def test_a_cell_without_a_stroke_plans_velocities_that_can_be_commanded() -> None:
+    planner = TapPlanner(
+        tolerance_m=50e-6, plant=NOMINAL, max_stroke_m=math.inf, velocity_raster=Raster(2e-3, 2e-3, 1.0)
+    )
+    tap = planner.next_tap(12e-3, 10.0)
+    assert isinstance(tap, Tap)
+    assert tap.velocity_m_s == pytest.approx(2e-3 * round(tap.velocity_m_s / 2e-3), rel=1e-8)
 
 
 def test_a_part_too_heavy_to_move_is_unreachable() -> None:

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from impactcell.errors import PositioningError
+from impactcell.numerics.raster import Raster
 from impactcell.positioning import SafetyLimits, Tap, TapPlanner
 from impactcell.positioning.safety_limits import check_tap
 from impactcell.positioning.task_state_machine import (
@@ -31,6 +32,14 @@ def planner() -> TapPlanner:
     made = TapPlanner(tolerance_m=50e-6)
     made.observe_friction(0.19, 0.004)
     return made
+
+
+def test_a_cell_whose_registers_only_command_more_than_its_limits_makes_no_tap() -> None:
+    for coarse in ({"velocity_raster": Raster(0.2, 0.2, 10.0)}, {"stroke_raster": Raster(2e-3, 2e-3, 1.0)}):
+        made = TapPlanner(tolerance_m=50e-6, **coarse)
+        made.observe_friction(0.19, 0.004)
+        with pytest.raises(PositioningError, match=r"press 3: a (tap|stroke) .*is not allowed, the limit is"):
+            begin_task(TaskState(), CELL, made, **GOOD)
 
 
 def waiting() -> tuple[TaskState, TapPlanner]:

@@ -155,6 +155,38 @@ def test_what_a_cell_that_places_parts_lacks_in_its_map_is_a_fault(tmp_path: Pat
     assert "no registers positioning_state, command_result, target_sequence, command_velocity: no" in missing
 
 
+def test_registers_that_command_coarse_taps_or_none_are_told(tmp_path: Path) -> None:
+    content = yaml.safe_load(SHIPPED.read_text())
+    registers = content["registers"]
+    registers["command_velocity"] |= {"type": "u16", "unit": "mm/s", "scale": 0.1}
+    registers["command_stroke"] |= {"type": "u16", "unit": "um"}
+    assert _said_of_commands(tmp_path, content) == []
+    registers["command_stroke"] |= {"unit": "mm", "scale": 0.1}
+    (steps,) = _said_of_commands(tmp_path, content)
+    assert (
+        "note: taps are planned in whole steps, 6 mm/min of register command_velocity and 0.1 mm of register "
+        "command_stroke: with a tolerance of 50 µm tasks may take more of them, and parts may stay outside"
+    ) in steps
+    registers["command_velocity"] |= {"scale": 0.001}
+    registers["command_stroke"] |= {"scale": 2.0}
+    none, ends = (text for text in _said_of_commands(tmp_path, content) if "whole steps" not in text)
+    assert "register command_stroke has no value between 0 and 1.5 mm: no tap can be commanded" in none
+    assert "note: " not in none
+    assert "note: register command_velocity ends at 3932.1 mm/min: no tap is commanded from there to" in ends
+
+
+def _said_of_commands(tmp_path: Path, content: dict[str, Any]) -> list[str]:
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(content))
+    path = cell_file(tmp_path, register_map=str(tmp_path / "map.yaml"))
+    cell = yaml.safe_load(path.read_text()) | {"positioning": {"travel_mm": 40.0}}
+    path.write_text(yaml.safe_dump(cell))
+    return [
+        str(found)
+        for found in judge_cell(read_cell(path))
+        if re.search("whole steps|register command_", found.message)
+    ]
+
+
 def test_a_map_without_an_abort_is_told_where_parts_are_placed(tmp_path: Path) -> None:
     content = yaml.safe_load(SHIPPED.read_text())
     del content["registers"]["command_abort"]

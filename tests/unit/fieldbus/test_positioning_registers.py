@@ -1,0 +1,49 @@
+"""What a register can command is what it shows again, to its last code."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from impactcell.fieldbus.positioning_registers import commanded_values
+from impactcell.fieldbus.register import Register
+from impactcell.fieldbus.registers import RegisterMap
+from impactcell.numerics.raster import ANY_VALUE
+
+
+def a_map(register: Register) -> RegisterMap:
+    return RegisterMap("one", {register.name: register})
+
+
+@given(
+    st.sampled_from(["u16", "i16", "u32", "bcd16"]),
+    st.sampled_from([0.001, 0.025, 0.1, 1.0, 7.0]),
+    st.sampled_from([-30.0, -0.3, 0.0, 0.3, 5.0]),
+    st.sampled_from([None, (-5, 90), (1000, 1200)]),
+)
+def test_the_ends_and_the_steps_of_a_register_are_shown_again(
+    kind: str, scale: float, offset: float, saturation: tuple[int, int] | None
+) -> None:
+    if saturation is not None and kind != "i16":
+        saturation = (max(saturation[0], 0), saturation[1])
+    register = Register("x", 0, kind, unit="mm", scale=scale, offset=offset, saturation=saturation)
+    values = commanded_values(a_map(register), "x")
+    if values.last < values.first:  # no code is above 0
+        return
+    assert 0.0 < values.first <= values.last
+    assert values.first > 1e-9 * values.step
+    for value in (values.first, min(values.first + values.step, values.last), values.last):
+        assert register.decode(register.encode(value)) == pytest.approx(value, rel=1e-12)
+    below = float(register.decode(register.encode(values.first - values.step)))  # type: ignore[arg-type]
+    assert below <= 1e-9 * values.step or below == pytest.approx(values.first)
+
+
+def test_floats_command_any_value(fpga: RegisterMap) -> None:
+    assert commanded_values(fpga, "command_velocity") is ANY_VALUE
+    bare = replace(fpga, registers={})
+    assert commanded_values(bare, "command_velocity") is ANY_VALUE
+    whole = a_map(Register("x", 0, "u64", unit="nm"))
+    assert commanded_values(whole, "x").last == pytest.approx(2**64 * 1e-9)
+    assert math.isfinite(commanded_values(whole, "x").last)
