@@ -7,6 +7,9 @@ from typing import Final
 
 from impactcell.errors import LinkError
 
+NO_NAME: Final = "a host's name has 1 to 63 characters between its dots"
+"""Why a name cannot be looked up, nor be that of a certificate: the codec `idna` refuses it."""
+
 
 @dataclass(frozen=True, slots=True)
 class TlsFiles:

@@ -48,6 +48,8 @@ GERMAN: Final = {
     r"no connection within (\S+) s": r"keine Verbindung innerhalb von \1 s",
     r"no connection: nothing listens at this host and port":
         "keine Verbindung: unter dieser Adresse und diesem Port antwortet kein Programm",
+    r"no connection: a host's name has 1 to 63 characters between its dots":
+        "keine Verbindung: ein Rechnername hat zwischen seinen Punkten je 1 bis 63 Zeichen",
     r"no connection: (?P<system>.+)": r"keine Verbindung: \g<system>",
     r"connection lost": "Verbindung verloren",
     r"connection lost: (?P<system>.+)": r"Verbindung verloren: \g<system>",

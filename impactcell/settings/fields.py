@@ -8,6 +8,8 @@ from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 
+from impactcell.fieldbus.link import NO_NAME
+
 
 def _resolved(value: object, info: ValidationInfo) -> object:
     if not isinstance(value, str) or not value:
@@ -105,12 +107,26 @@ def module_host(value: str) -> str:
     ValueError: a host is a name or an address alone: write `host: press-1` and `port: 502`
     """
     if _is_host(value):
-        return value
+        return host_name(value)
     bare = re.sub(r"^\w[\w+.-]*://|[/?#].*$", "", value.strip())
     name, port = _PORT.sub("", bare).strip("[]"), _PORT.search(bare)
     meant = f"`host: {name}`" if _is_host(name) else "it as in `host: 10.0.0.5` or `host: press-1.local`"
     behind = f" and `port: {port[1]}`" if port and _is_host(name) else ""
     raise ValueError(f"a host is a name or an address alone: write {meant}{behind}")
+
+
+def host_name(value: str) -> str:
+    """See that the network can be asked for a name, and a certificate carry it.
+
+    >>> host_name("press-1..plant")
+    Traceback (most recent call last):
+    ValueError: a host's name has 1 to 63 characters between its dots, as in press-1.local
+    """
+    try:
+        value.encode("idna")
+    except UnicodeError as error:
+        raise ValueError(f"{NO_NAME}, as in press-1.local") from error
+    return value
 
 
 def _is_host(value: str) -> bool:

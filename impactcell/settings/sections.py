@@ -23,6 +23,7 @@ from impactcell.settings.fields import (
     Probability,
     Section,
     cell_name,
+    host_name,
     module_host,
     opcua_endpoint,
 )
@@ -62,7 +63,7 @@ class TlsSection(Section):
     """Our own certificate (PEM)."""
     key: InputFile | None = None
     """Our own private key (PEM)."""
-    server_name: str | None = None
+    server_name: Annotated[str, AfterValidator(host_name)] | None = None
     """Name that the module's certificate must carry; absent: its `host`."""
 
 

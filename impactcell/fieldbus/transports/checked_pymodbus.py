@@ -38,7 +38,7 @@ from impactcell.errors import (
     ProtocolError,
 )
 from impactcell.fieldbus.codec import Request
-from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.link import NO_NAME, ModuleLink
 from impactcell.fieldbus.transports.reply_watch import MbapWatch, ReplyWatch, RtuWatch
 
 _NEVER_S: Final = 3600.0
@@ -217,8 +217,12 @@ class CheckedPymodbus:
             except OSError as error:
                 self._why = error
                 raise
+            except UnicodeError as error:
+                self._why = OSError(NO_NAME)
+                raise self._why from error
             except _PORT_REFUSES as error:
-                self._why = OSError(f"the serial port refuses its settings: {error.args[-1]}")
+                refuses = "" if self._link.serial is None else "the serial port refuses its settings: "
+                self._why = OSError(f"{refuses}{error.args[-1]}")
                 raise self._why from error
 
         client.ctx.call_create = creating

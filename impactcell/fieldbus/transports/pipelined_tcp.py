@@ -5,7 +5,7 @@ import contextlib
 from collections.abc import Sequence
 
 from impactcell.errors import LinkError
-from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.link import NO_NAME, ModuleLink
 from impactcell.fieldbus.request_batching import RequestBatch
 from impactcell.fieldbus.transports.request_window import RequestWindow
 from impactcell.fieldbus.transports.tcp_connection import TcpConnection
@@ -66,6 +66,8 @@ class PipelinedTcp:
             raise LinkError(f"{link}: no connection: nothing listens at this host and port") from error
         except OSError as error:
             raise LinkError(f"{link}: no connection: {error.strerror or error}") from error
+        except UnicodeError as error:
+            raise LinkError(f"{link}: no connection: {NO_NAME}") from error
 
     async def close(self) -> None:
         """Close the connection and wait until it is gone; all that is pending fails."""

@@ -2,6 +2,7 @@
 
 import asyncio
 import socket
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -238,6 +239,21 @@ async def test_transactions_go_on_over_connections_also_over_one_that_is_refused
                     assert await client.exchange(1, read_request(FunctionCode.READ_HOLDING, 0, 1)) == b"\0\7"
                 await client.close()
     assert transactions == [64_000, 1, 2, 3]
+
+
+@pytest.mark.parametrize("kind", ["tcp", "tls", "udp", "rtu_over_tcp"])
+@pytest.mark.parametrize("host", ["press-1..plant", "a" * 64])
+async def test_a_host_that_is_no_name_is_no_connection(kind: str, host: str, tmp_path: Path) -> None:
+    """It was a fault of this program, or the settings of a serial port that there is not."""
+    server, tls = server_for(kind, Image(), tmp_path)
+    async with server:
+        link = replace(link_to(kind, server, tls), host=host)
+    client = ModbusClient(transport_for(link))
+    with pytest.raises(
+        LinkError, match=r"no connection: a host's name has 1 to 63 characters between its dots$"
+    ):
+        await client.connect()
+    await client.close()
 
 
 @every

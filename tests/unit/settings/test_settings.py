@@ -53,7 +53,9 @@ def test_every_fault_at_once_with_its_place(config: Path) -> None:
         assert hint in str(caught.value)
 
 
-@pytest.mark.parametrize("host", ["10.0.0.5", "press-1.local", "fpga_2", "::1", "fe80::1%eth0", "prüfstand"])
+@pytest.mark.parametrize(
+    "host", ["10.0.0.5", "press-1.local", "press-1.", "a" * 63, "fpga_2", "::1", "fe80::1%eth0", "prüfstand"]
+)
 def test_a_name_or_an_address_is_a_host(config: Path, host: str) -> None:
     assert read_cell(edited(config, "host: 127.0.0.1", f"host: '{host}'")).settings.module.host == host
 
@@ -73,6 +75,18 @@ def test_a_name_or_an_address_is_a_host(config: Path, host: str) -> None:
         ("host: 127.0.0.1", "host: the module", "write it as in `host: 10.0.0.5`"),
         ("host: 127.0.0.1", "host: 10.0.0.256", "write it as in `host: 10.0.0.5`"),
         ("host: 127.0.0.1", "host: ''", "write it as in `host: 10.0.0.5`"),
+        (
+            "host: 127.0.0.1",
+            "host: press-1..plant",
+            "6:9: module.host: a host's name has 1 to 63 characters between its dots, as in press-1.local",
+        ),
+        ("host: 127.0.0.1", f"host: {'a' * 64}.plant", "module.host: a host's name has 1 to 63 characters"),
+        ("host: 127.0.0.1", f"host: {'ü' * 60}", "module.host: a host's name has 1 to 63 characters"),
+        (
+            "host: 127.0.0.1",
+            "host: 127.0.0.1\n  tls: {ca_certificate: ../models/prototype.yaml, server_name: press-1..plant}",
+            "server_name: a host's name has 1 to 63 characters between its dots",
+        ),
         ("wear_limit: 0.25", "wear_limit: 0,25", "not '0,25'; decimals have a point, not a comma: 0.25"),
         (
             "  stroke_mm: 1.5",

@@ -23,7 +23,7 @@ from impactcell.fieldbus.codec import (
     write_request,
 )
 from impactcell.fieldbus.device_identification import identification_request
-from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.link import NO_NAME, ModuleLink
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.transports.pipelined_tcp import PipelinedTcp
 from impactcell.fieldbus.transports.reply_watch import MbapWatch, RtuWatch
@@ -133,6 +133,10 @@ def test_answers_that_do_not_fit_have_their_german() -> None:
     ("reason", "german"),
     [
         ("no connection: No route to host", "keine Verbindung: kein Weg dorthin"),
+        (
+            f"no connection: {NO_NAME}",
+            "keine Verbindung: ein Rechnername hat zwischen seinen Punkten je 1 bis 63 Zeichen",
+        ),
         (
             "connection lost: [Errno 104] Connection reset by peer",
             "Verbindung verloren: die Gegenseite hat die Verbindung abgebrochen",
