@@ -149,12 +149,12 @@ class ModuleAcquisition:
             sent_s = loop.time()
             try:
                 status = self._numbers.status(await self._poll(), taken.last)
-                backoff.reset()
                 newest_now = CycleId(status.session, status.cycle_counter)
                 schedule.record_poll(sent_s, loop.time(), new=newest_now != newest)
                 newest = newest_now
                 target = choice.target(taken.last, status, loop.time())
                 if target is None:
+                    backoff.reset()
                     await asyncio.sleep(schedule.delay_s(loop.time()))
                     continue
                 await self.find_window()
@@ -171,6 +171,8 @@ class ModuleAcquisition:
                     await asyncio.sleep(schedule.delay_s(loop.time()))
                 continue
             choice.record_success()
+            if fetched.readable:  # not for the status block alone, which says nothing of the window
+                backoff.reset()
             capture = self._dated(replace(fetched.capture, session=target.cycle_id.session))
             last = taken.last
             schedule.update(

@@ -32,8 +32,11 @@ _AT_ONCE: Final = 5
 _MOST_ATTEMPTS: Final = 16
 """Readings of one cycle that may be discarded before it is given up though the ring has it: some 2.5 s, for
 which all later ones wait."""
-_MOST_LINK_FAILURES: Final = 30
-"""Times that the link may fail on one cycle, without getting further, before it is given up."""
+_MOST_LINK_FAILURES: Final = 40
+"""Times that the link may fail on one cycle, without getting further, before it is given up though the ring
+has it: with the growing pauses between them some ten seconds, in which a gateway or a module has started."""
+_URGENT_LINK_FAILURES: Final = 14
+"""The same, where the ring is about to overwrite the cycle and those behind it: some three seconds."""
 _PAUSE_S, _LONGEST_PAUSE_S = 0.001, 0.25
 """Rest after the first discarded reading, doubled with each up to the second: the module may be writing the
 slot, or another client be selecting others."""
@@ -109,10 +112,10 @@ class CaptureReader:
                     if progressed:
                         continue
                 else:
-                    self._link_failures += not progressed
                     if isinstance(error, ProtocolError) or "capture_crc32" not in self._registers:
-                        self._partial = None  # what came before the fault may be wrong too
-                    if self._link_failures < _MOST_LINK_FAILURES:
+                        self._partial, progressed = None, False  # what came before may be wrong too
+                    self._link_failures += not progressed
+                    if self._link_failures < self._most_link_failures(target):
                         raise
                     reason = f"the link failed each time: {error}"
                     break
@@ -133,8 +136,12 @@ class CaptureReader:
 
     def _is_urgent(self, target: NextCapture) -> bool:
         """Whether so many newer ones wait in the ring that they would be lost for this one."""
-        waiting = cycles_after(target.cycle_id.cycle, target.counter)
-        return waiting >= max(1, self._registers.slots // 2)  # nobody waits behind one buffer
+        return _waiting_behind(target) >= max(1, self._registers.slots // 2)  # nobody waits behind one buffer
+
+    def _most_link_failures(self, target: NextCapture) -> int:
+        """How often the link may fail on a cycle: it mostly fails on all, and giving one up wins nothing."""
+        about_to_go = _waiting_behind(target) >= max(1, self._registers.slots - 2)
+        return _URGENT_LINK_FAILURES if about_to_go else _MOST_LINK_FAILURES
 
     def _progressed(self) -> bool:
         """Whether the interrupted reading got further than the one before."""
@@ -249,6 +256,11 @@ class CaptureReader:
         capture = replace(capture, cycle=partial.target.cycle_id.cycle)
         named = tuple(f"{self._cell}: cycle {capture.cycle}: {fault}" for fault in faults)
         return FetchedCapture(capture, partial.identity, readable=True, faults=named)
+
+
+def _waiting_behind(target: NextCapture) -> int:
+    """How many newer cycles wait in the ring."""
+    return cycles_after(target.cycle_id.cycle, target.counter)
 
 
 def _is_of_request(error: FieldbusError, *, progressed: bool) -> bool:

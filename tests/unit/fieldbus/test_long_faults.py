@@ -2,7 +2,7 @@
 
 import asyncio
 import itertools
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 
 import numpy as np
@@ -14,6 +14,7 @@ from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import WIRE, RegisterMap, Words
 from impactcell.fieldbus.transports import transport_for
+from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice
 from tests.unit.fieldbus.test_acquisition import assert_whole, make, running, take
 
@@ -88,6 +89,97 @@ async def test_a_capture_that_is_damaged_for_good_is_given_up_also_where_nothing
         [received] = await take(receptions, 1)
         assert received.capture.force is None
         assert module.status.discarded == 16
+
+
+def fail_window(server: ModbusServer, how: str, is_failing: Callable[[], bool]) -> None:
+    """Let readings of the window fail while `is_failing`, the status block being answered as ever."""
+    answer = server.answer
+
+    def answer_or_fail(unit: int, pdu: bytes) -> bytes | None:
+        if pdu[0] == 3 and int.from_bytes(pdu[1:3]) >= 256 and is_failing():
+            if how == "exception 4":
+                return bytes((0x83, 4))
+            server.drop_clients()
+            return None
+        return answer(unit, pdu)
+
+    server.answer = answer_or_fail  # type: ignore[method-assign]
+
+
+FAILS = pytest.mark.parametrize("how", ["exception 4", "reset"])
+
+
+@FAILS
+async def test_a_window_that_fails_for_seconds_costs_no_cycle_and_few_connections(
+    fpga: RegisterMap, how: str
+) -> None:
+    device = ScriptedDevice(fpga)
+    make(device, 6)
+    async with running(fpga, device, window=1) as (server, module, receptions):
+        loop = asyncio.get_running_loop()
+        over_s = loop.time() + 2.5
+        fail_window(server, how, lambda: loop.time() < over_s)
+        received = await take(receptions, 6)
+        assert [each.capture.cycle for each in received] == list(range(1, 7))
+        for each in received:
+            assert_whole(each)
+        assert (module.status.unreadable, module.status.missed) == (0, 0)
+        assert module.status.reconnects < 20
+
+
+@FAILS
+async def test_a_full_ring_is_not_thrown_away_while_its_window_fails(fpga: RegisterMap, how: str) -> None:
+    device = ScriptedDevice(fpga)
+    make(device, fpga.slots)
+    async with running(fpga, device, window=1) as (server, _, receptions):
+        loop = asyncio.get_running_loop()
+        over_s = loop.time() + 1.5
+        fail_window(server, how, lambda: loop.time() < over_s)
+        for each in await take(receptions, fpga.slots):
+            assert_whole(each)
+
+
+@FAILS
+@pytest.mark.parametrize(("made", "least_s", "most_s"), [(1, 5.0, 20.0), (16, 1.5, 5.0)])
+async def test_a_cycle_that_the_link_never_carries_is_given_up_before_it_costs_others(
+    fpga: RegisterMap, how: str, made: int, least_s: float, most_s: float
+) -> None:
+    """After some ten seconds, or sooner where the ring is about to overwrite what lies behind it."""
+    device = ScriptedDevice(fpga)
+    make(device, made)
+    async with running(fpga, device, window=1) as (server, module, receptions):
+        loop = asyncio.get_running_loop()
+        fail_window(server, how, lambda: device.get("window_cycle") == 1)
+        began_s = loop.time()
+        [bad] = await take(receptions, 1)
+        assert least_s < loop.time() - began_s < most_s
+        assert (bad.cycle_id.cycle, bad.capture.force) == (1, None)
+        assert "cell-1: cycle 1 could not be read: the link failed each time: " in bad.faults[0]
+        for each in await take(receptions, made - 1):
+            assert_whole(each)
+        assert (module.status.unreadable, module.status.missed) == (1, 0)
+
+
+async def test_what_is_read_anew_after_each_fault_gets_no_further(fpga: RegisterMap) -> None:
+    """Without a CRC nothing is kept of a reading that was interrupted, however far it came."""
+    registers = {name: register for name, register in fpga.registers.items() if name != "capture_crc32"}
+    layout = RegisterMap(fpga.name, registers)
+    device = ScriptedDevice(layout)
+    make(device)
+    async with running(layout, device, window=1) as (server, module, receptions):
+        real, address = device.read, layout["force"].address + 2000
+
+        def failing(table: str, first: int, count: int) -> Words:
+            if first <= address < first + count and device.get("window_cycle") == 1:
+                server.drop_clients()
+            return real(table, first, count)
+
+        device.read = failing  # type: ignore[method-assign]
+        [bad] = await take(receptions, 1)
+        assert "the link failed each time" in bad.faults[0]
+        make(device)
+        assert_whole((await take(receptions, 1))[0])
+        assert module.status.unreadable == 1
 
 
 class OneByOne(asyncio.Protocol):
