@@ -177,9 +177,7 @@ class ModuleAcquisition:
             last = taken.last
             schedule.update(
                 1e-9 * fetched.capture.time_ns or loop.time(),
-                cycles_after(last.cycle, target.cycle_id.cycle)
-                if last and last.session == target.cycle_id.session
-                else 0,
+                cycles_after(last.cycle, target.cycle_id.cycle) if last and not target.restarted else 0,
                 newest=target.cycle_id == newest,
             )
             taken.add(target.cycle_id, fetched.header, fetched.capture.time_ns)

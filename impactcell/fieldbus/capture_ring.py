@@ -73,6 +73,7 @@ def next_capture(
     ring: Sequence[int],
     skip: int = 0,
     seen: int | None = None,
+    period: int | None = None,
 ) -> NextCapture | None:
     """Return the oldest cycle of the ring that comes after `last`, or None if there is nothing new.
 
@@ -88,6 +89,8 @@ def next_capture(
         Leave out so many of the oldest, because they are overwritten faster than they are read.
     seen : int, optional
         Last complete cycle that the module was seen to have in the life of `last`.
+    period : int, optional
+        Cycles after which the module's counter shows the same again, where those are few.
     """
     if counter == 0 or last == CycleId(session, counter):
         return None
@@ -110,14 +113,16 @@ def next_capture(
     elif restarted:
         complete = len(ages_to_read) == len(ring)
         unread = 0 if seen is None else cycles_after(last.cycle, seen)
-        made = _made_before(last.cycle, counter, len(ages_to_read), unread, complete=complete)
+        made = _made_before(last.cycle, counter, len(ages_to_read), unread, period, complete=complete)
         missed = max(0, made - age)
     else:
         missed = max(0, behind - age - 1)
     return NextCapture(CycleId(session, ring[slot]), slot, counter, missed, restarted)
 
 
-def _made_before(last: int, counter: int, held: int, unread: int, *, complete: bool) -> int:
+def _made_before(
+    last: int, counter: int, held: int, unread: int, period: int | None, *, complete: bool
+) -> int:
     """Return how many cycles before the newest are known to have been made since `last`, over a restart.
 
     A module counts from 1 again, goes on counting where it was, or begins where somebody set its counter. A
@@ -132,13 +137,18 @@ def _made_before(last: int, counter: int, held: int, unread: int, *, complete: b
         How many the ring holds.
     unread : int
         How many were seen to be complete before the restart, after `last`.
+    period : int or None
+        As of `next_capture`.
     complete : bool
         Whether it is full.
     """
+    if period is None:
+        since = cycles_after(last, counter)
+    else:
+        since, counter = (counter - last) % period, counter % period
     if held == counter:  # from 1 again, and all are there
         return unread + counter - 1
-    since = cycles_after(last, counter)
-    went_on = held <= since <= CYCLE_PERIOD // 2  # a start empties the ring
+    went_on = held <= since <= (period or CYCLE_PERIOD) // 2  # a start empties the ring
     if complete and not (went_on and _FEWER * since < counter):
         return unread + (counter - 1 if counter <= CYCLE_PERIOD // 2 else 0)
     return since - 1 if went_on else unread

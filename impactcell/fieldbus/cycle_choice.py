@@ -3,6 +3,7 @@
 from typing import Final
 
 from impactcell.fieldbus.capture_ring import NextCapture, is_after, is_consistent, next_capture
+from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.fetched_capture import NotFetched
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.fieldbus.status_block import StatusBlock
@@ -22,6 +23,7 @@ class CycleChoice:
     def __init__(self, registers: RegisterMap, log: CellLogger) -> None:
         self._registers = registers
         self._log = log
+        self._period = CycleNumbers.of(registers["cycle_counter"].kind).period
         self._overwritten = self._disagreements = 0
         self._contradicted_since_s: float | None = None
         self._told = False
@@ -39,7 +41,7 @@ class CycleChoice:
         if last is not None and newest.session == last.session and not is_after(last.cycle, newest.cycle):
             self._seen = newest
         seen = self._seen.cycle if self._seen and last and self._seen.session == last.session else None
-        target = next_capture(last, newest.session, newest.cycle, status.ring, skip, seen)
+        target = next_capture(last, newest.session, newest.cycle, status.ring, skip, seen, self._period)
         if target is None:
             self._agree()
         return target

@@ -1,10 +1,11 @@
 """Numbers of cycles that a module counts with fewer digits than a year of production needs. Pure.
 
-A counter of 16 bits begins anew after 65 536 cycles. Here cycles are numbered on: of all numbers that the
-counter may mean, the one nearest to the last cycle taken.
+A counter of 16 bits begins anew after 65 536 cycles, and with each start of the module. Here cycles are
+numbered on from the last one taken. Whether a counter that shows less has gone round, or the module has been
+started anew, is told by its session; without one it was started anew if that takes far fewer cycles.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -13,6 +14,17 @@ from impactcell.records import CycleId
 
 _PERIOD: Final[Mapping[str, int]] = {"u16": 2**16, "bcd16": 10**4, "bcd32": 10**8}
 """Cycles after which a counter of each type shows the same again, where those are few."""
+_FEWEST_BEHIND: Final = 256
+"""So many cycles behind the last one a gateway may still show, also of a module with one buffer."""
+_MOST_AHEAD: Final = 2**25
+"""More cycles than a module makes in an outage: at twenty a second, which no tap allows, in three weeks."""
+_FEWER: Final = 8
+"""So many times fewer cycles since a start make it likelier than that the counter has gone round."""
+
+
+def most_behind(slots: int) -> int:
+    """Return how far behind the last cycle taken an old reply may be, of a module with so many slots."""
+    return max(2 * slots, _FEWEST_BEHIND)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +46,7 @@ class CycleNumbers:
         return cls(_PERIOD.get(kind))
 
     def number(self, shown: int, near: int) -> int:
-        """Return the number of the cycle that a counter shows, not below 0; 0 for none."""
+        """Return the number that is nearest of those that a counter may mean, not below 0; 0 for none."""
         if self.period is None:
             return shown
         behind = (near - shown) % self.period
@@ -48,11 +60,53 @@ class CycleNumbers:
     def status(self, status: StatusBlock, last: CycleId | None) -> StatusBlock:
         """Return a status block with numbers that go on from the last cycle taken.
 
-        A slot of the ring whose number cannot be read counts as empty.
+        After a start of the module they are what its counter shows. A slot of the ring whose number cannot be
+        read counts as empty.
         """
         if self.period is None and UNREADABLE not in status.ring:
             return status
-        near = last.cycle if last is not None and last.session == status.session else 0
-        counter = self.number(status.cycle_counter, near)
-        ring = tuple(0 if cycle == UNREADABLE else self.number(cycle, counter) for cycle in status.ring)
-        return replace(status, cycle_counter=counter, ring=ring)
+        counter = status.cycle_counter
+        if self.period is not None and last is not None and last.session == status.session:
+            behind = most_behind(len(status.ring))
+            counter = _number_after(last.cycle, counter, self.period, behind, told=bool(status.session))
+        return replace(status, cycle_counter=counter, ring=tuple(self._ring(status.ring, counter)))
+
+    def _ring(self, ring: Sequence[int], counter: int) -> Iterator[int]:
+        """Give the numbers of the cycles in a ring whose newest one is `counter`."""
+        for slot, shown in enumerate(ring):
+            if shown == UNREADABLE:
+                yield 0
+            elif shown or self.period is None:
+                yield self.number(shown, near=counter)
+            else:
+                yield _number_of_zero(ring, slot, counter, self.period)
+
+
+def _number_of_zero(ring: Sequence[int], slot: int, counter: int, period: int) -> int:
+    """Return which cycle a slot that shows 0 holds: none, unless those before and after it are beside it."""
+    age = counter % period  # of the last cycle for which the counter shows 0
+    follows = ring[slot - 1] == period - 1 or age == len(ring) - 1
+    is_followed = age == 0 or ring[(slot + 1) % len(ring)] == 1
+    return counter - age if age < len(ring) and follows and is_followed else 0
+
+
+def _number_after(last: int, shown: int, period: int, most_behind: int, *, told: bool) -> int:
+    """Return the number of the cycle that a counter shows some time after cycle `last` was taken.
+
+    Parameters
+    ----------
+    last, shown, period : int
+    most_behind : int
+        So far behind `last` an old status block can be; a module that was started anew may be there, too.
+    told : bool
+        Whether the module would tell if it had been started anew.
+    """
+    ahead, behind = (shown - last) % period, (last - shown) % period
+    if behind <= min(most_behind, last):
+        return last - behind
+    if told:
+        goes_on = ahead <= _MOST_AHEAD
+    else:
+        goes_round = ahead > shown
+        goes_on = not goes_round or (2 * ahead < period and ahead <= _FEWER * max(shown, 1))
+    return last + ahead if goes_on else shown

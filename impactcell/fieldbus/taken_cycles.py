@@ -9,11 +9,8 @@ from collections import OrderedDict
 from typing import Final
 
 from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_after
+from impactcell.fieldbus.cycle_numbers import most_behind
 from impactcell.records import CycleId
-
-_FEWEST_HEADERS: Final = 256
-"""So many cycles are remembered at least, also of a module with one buffer: what a gateway may still show."""
-
 
 _SESSIONS: Final = 16
 """So many sessions are remembered that the module has left."""
@@ -50,7 +47,7 @@ class TakenCycles:
         self.last, self._last_time_ns, self._first_behind = cycle_id, time_ns, None
         self._headers.pop(cycle_id, None)
         self._headers[cycle_id] = header
-        while len(self._headers) > max(2 * self._slots, _FEWEST_HEADERS):
+        while len(self._headers) > most_behind(self._slots):
             self._headers.popitem(last=False)
 
     def is_behind(self, cycle_id: CycleId) -> bool:
