@@ -65,12 +65,13 @@ class ModuleAcquisition:
         self.registers = registers
         self._log = CellLogger(logging.getLogger(__name__), cell)
         self.status_block: StatusBlock | None = None
-        """What the module said at the last poll; None before the first."""
+        """What the module said at the last poll, with cycles numbered on; None before the first."""
         self._client = client
         self.register_client = RegisterClient(client, registers)
         self._status_reader = StatusReader(self.register_client)
         self._reader = CaptureReader(cell, self.register_client)
         self._numbers = CycleNumbers.of(registers["cycle_counter"].kind)
+        self._taken = TakenCycles(None, 0, registers.slots)
         self._status = ModuleStatus()
         self._on_change = on_change
         self._ready = asyncio.Event()
@@ -113,7 +114,7 @@ class ModuleAcquisition:
 
     async def read_status(self) -> StatusBlock:
         """Read the status block now; raises FieldbusError where `captures` would only note it."""
-        self.status_block = await self._status_reader.read()
+        self.status_block = self._numbers.status(await self._status_reader.read(), self._taken.last)
         return self.status_block
 
     async def acknowledge(self, cycle_id: CycleId) -> None:
@@ -140,7 +141,7 @@ class ModuleAcquisition:
         after_time_ns : int
             Its own time; 0 where that is not known.
         """
-        taken = TakenCycles(after, after_time_ns, self.registers.slots)
+        taken = self._taken = TakenCycles(after, after_time_ns, self.registers.slots)
         backoff, schedule = Backoff(), PollSchedule()
         loop = asyncio.get_running_loop()
         newest = CycleId(0, 0)
@@ -148,7 +149,7 @@ class ModuleAcquisition:
         while True:
             sent_s = loop.time()
             try:
-                status = self._numbers.status(await self._poll(), taken.last)
+                status = await self._poll()
                 newest_now = CycleId(status.session, status.cycle_counter)
                 schedule.record_poll(sent_s, loop.time(), new=newest_now != newest)
                 newest = newest_now

@@ -61,7 +61,7 @@ class CycleNumbers:
         """Return a status block with numbers that go on from the last cycle taken.
 
         After a start of the module they are what its counter shows. A slot of the ring whose number cannot be
-        read counts as empty.
+        read counts as empty. A batch that is announced begins at the cycle nearest to the counter.
         """
         if self.period is None and UNREADABLE not in status.ring:
             return status
@@ -69,7 +69,12 @@ class CycleNumbers:
         if self.period is not None and last is not None and last.session == status.session:
             behind = most_behind(len(status.ring))
             counter = _number_after(last.cycle, counter, self.period, behind, told=bool(status.session))
-        return replace(status, cycle_counter=counter, ring=tuple(self._ring(status.ring, counter)))
+        batch = status.batch
+        if batch is not None:
+            batch = replace(batch, from_cycle=self.number(batch.from_cycle, near=counter))
+        return replace(
+            status, cycle_counter=counter, ring=tuple(self._ring(status.ring, counter)), batch=batch
+        )
 
     def _ring(self, ring: Sequence[int], counter: int) -> Iterator[int]:
         """Give the numbers of the cycles in a ring whose newest one is `counter`."""

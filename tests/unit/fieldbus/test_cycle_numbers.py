@@ -7,6 +7,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from impactcell.cell.preprocessing import BatchNaming, assign_batch
 from impactcell.fieldbus.capture_ring import next_capture
 from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.registers import RegisterMap
@@ -223,6 +224,32 @@ def short_ring(fpga: RegisterMap) -> RegisterMap:
     layout = with_kind(layout, "ring_cycle", "u16", count=SLOTS)
     without = ("session", "window_session", "acknowledge_session", "batch_sequence")
     return replace(layout, registers={n: r for n, r in layout.registers.items() if n not in without})
+
+
+@pytest.mark.parametrize(
+    ("before", "announced", "from_cycle"),
+    [(70_000, 4_480, 70_016), (65_530, 10, 65_546), (70_000, 4_460, 69_996)],
+)
+async def test_a_batch_is_announced_from_a_cycle_of_the_module_s_own_counter_on(
+    fpga: RegisterMap, before: int, announced: int, from_cycle: int
+) -> None:
+    layout = with_kind(
+        with_kind(with_kind(fpga, "cycle_counter", "u16"), "window_cycle", "u16"), "ring_cycle", "u16"
+    )
+    device = ScriptedDevice(layout, session=7, counter=before % 65_536)
+    device.put("batch_from_cycle", announced)
+    device.put("batch_announced", "B-18")
+    device.put("batch_sequence", 2)
+    async with running(layout, device, after=CycleId(7, before)) as (_, module, receptions):
+        naming, expected = BatchNaming(None, "B-17", 1), []
+        for _ in range(20):
+            make(device, batch_id="B-17")
+            (received,) = await take(receptions, 1)
+            assert module.status_block is not None
+            batch = assign_batch(naming, received.capture, module.status_block.batch)
+            naming = batch.naming
+            expected += [received.cycle_id.cycle] if batch.expected else []
+        assert expected == [max(from_cycle, before + 1)]
 
 
 async def test_an_empty_slot_of_a_ring_is_no_cycle_after_a_start_that_only_the_counter_tells(
