@@ -6,6 +6,7 @@ the module or the link does: that is said in its `status` and in the `faults` of
 """
 
 import asyncio
+import contextlib
 import logging
 import time
 from collections.abc import AsyncGenerator, Callable
@@ -14,6 +15,7 @@ from types import TracebackType
 from typing import Self
 
 from impactcell.errors import FieldbusError, LinkError
+from impactcell.fieldbus.acknowledgement import Acknowledgement
 from impactcell.fieldbus.backoff import Backoff
 from impactcell.fieldbus.capture_reader import CaptureReader
 from impactcell.fieldbus.capture_ring import cycles_after
@@ -75,8 +77,7 @@ class ModuleAcquisition:
         self._status = ModuleStatus()
         self._on_change = on_change
         self._ready = asyncio.Event()
-        self._durable: CycleId | None = None
-        self._acknowledged: CycleId | None = None
+        self._acknowledgement = Acknowledgement(self._log, self.register_client, self._numbers)
         self._connections = 0
         self._said_given_up = False
         self._identity = IdentityCheck(cell, self.register_client, self._status_reader)
@@ -120,14 +121,13 @@ class ModuleAcquisition:
     async def acknowledge(self, cycle_id: CycleId) -> None:
         """Tell the module that the cycle `cycle_id` and all before it are durable.
 
-        Without a connection it is told as soon as there is one; a module without the registers is not told.
+        Without a connection it is told as soon as there is one, if it has not been started anew meanwhile; a
+        module without the registers is not told.
         """
-        self._durable = cycle_id
-        if self._ready.is_set():
-            try:
-                await self._send_acknowledgement()
-            except FieldbusError as error:
-                self._log.info("the acknowledgement will be repeated: %s", error, cycle=cycle_id.cycle)
+        self._acknowledgement.durable = cycle_id
+        if self._ready.is_set() and self.status_block is not None:
+            with contextlib.suppress(FieldbusError):  # it is repeated by the next poll
+                await self._acknowledgement.send(self.status_block)
 
     async def captures(
         self, after: CycleId | None = None, after_time_ns: int = 0
@@ -225,7 +225,7 @@ class ModuleAcquisition:
         await self._client.connect()
         self._identity.forget()
         await self._identity.check()
-        self._acknowledged = None
+        self._acknowledgement.begin_connection()
 
     async def _poll(self) -> StatusBlock:
         if not self._client.connected:
@@ -233,22 +233,12 @@ class ModuleAcquisition:
         self._say_given_up()
         status = await self.read_status()
         await self._identity.check_word_order(status)
-        if self._durable != self._acknowledged:
-            await self._send_acknowledgement()
+        await self._acknowledgement.send(status)
         if not self._ready.is_set():
             self._connections += 1
             self._report_link(connected=True, reason="")
             self._ready.set()
         return status
-
-    async def _send_acknowledgement(self) -> None:
-        cycle_id = self._durable
-        if cycle_id is not None and "acknowledge_cycle" in self.registers:
-            values = {"acknowledge_cycle": self._numbers.shown(cycle_id.cycle)}
-            if "acknowledge_session" in self.registers:
-                values["acknowledge_session"] = cycle_id.session
-            await self.register_client.write_values(values)
-        self._acknowledged = cycle_id
 
     async def _disconnect(self, error: FieldbusError) -> None:
         """Close the connection after an error and say why, once for each new reason."""
