@@ -119,6 +119,14 @@ def _connection_faults(cell: CellConfig, other: CellConfig) -> Iterator[str]:
                 f"module.{key}; they share one connection: give both the same",
                 f"module.{key}",
             )
+    for one, beside in ((cell, other), (other, cell)):
+        window = one.settings.module.window
+        if window is not None and window > 1:
+            yield one.fault(
+                f"`window: {window}` is for a module with an endpoint of its own; {beside.path} is behind "
+                "the same gateway, which is asked one request at a time: leave it out",
+                "module.window",
+            )
 
 
 def _page_faults(cell: CellConfig, other: CellConfig) -> Iterator[str]:

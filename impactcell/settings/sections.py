@@ -10,30 +10,26 @@ from pydantic import AfterValidator, Field, model_validator
 
 from impactcell.alarms.rules import wear_limit, wear_warning
 from impactcell.cell.preprocessing import CaptureDefaults
-from impactcell.fieldbus.link import ModuleLink
 from impactcell.journal.retention import Retention
 from impactcell.settings.fields import (
     AnyPath,
-    InputFile,
     ModelFile,
-    NotNegative,
     OutputDirectory,
     OutputFile,
     Positive,
     Probability,
     Section,
     cell_name,
-    host_name,
-    module_host,
     opcua_endpoint,
 )
+from impactcell.settings.module_section import ModuleSection
 from impactcell.settings.positioning_section import PositioningSection
 from impactcell.settings.web_section import WebSection
 from impactcell.tracking.signature.tracker import SignatureSettings
 from impactcell.tracking.wear_batch import TrackerSettings
 
-_LINK, _CAPTURE, _TRACKER, _SIGNATURE, _RETENTION = (
-    ModuleLink(), CaptureDefaults(), TrackerSettings(), SignatureSettings(), Retention()
+_CAPTURE, _TRACKER, _SIGNATURE, _RETENTION = (
+    CaptureDefaults(), TrackerSettings(), SignatureSettings(), Retention()
 )  # fmt: skip
 _WEAR_LIMIT, _WEAR_WARNING = wear_limit.RULE.settings, wear_warning.RULE.settings
 """What the parts of the service do by themselves; a key that is left out means that."""
@@ -52,72 +48,6 @@ class IdentificationSection(Section):
     """Globally unique name of the cell."""
     location: str = ""
     """Where the cell stands."""
-
-
-class TlsSection(Section):
-    """Modbus/TCP Security: both sides show certificates."""
-
-    ca_certificate: InputFile
-    """Certificates (PEM) that the module's certificate must lead to."""
-    certificate: InputFile | None = None
-    """Our own certificate (PEM)."""
-    key: InputFile | None = None
-    """Our own private key (PEM)."""
-    server_name: Annotated[str, AfterValidator(host_name)] | None = None
-    """Name that the module's certificate must carry; absent: its `host`."""
-
-
-class SerialSection(Section):
-    """The serial line that the module is on."""
-
-    device: str
-    """Serial port, as in /dev/ttyUSB0 or COM3."""
-    baudrate: Annotated[int, Field(ge=300, le=4_000_000)] = 19_200
-    """Bits a second."""
-    parity: Literal["none", "even", "odd"] = "even"
-    """Parity bit; without one, Modbus wants two stop bits."""
-    stop_bits: Literal[1, 2] = 1
-    """Stop bits of a character."""
-
-
-class ModuleSection(Section):
-    """The measuring module, and how it is reached."""
-
-    transport: Literal["tcp", "tls", "udp", "rtu_over_tcp", "rtu"] = "tcp"
-    """What requests travel on: `tcp`, also encrypted, has many in flight, each of the others one."""
-    serial: SerialSection | None = None
-    """Serial line of transport `rtu`, in the place of host and port."""
-
-    host: Annotated[str, AfterValidator(module_host)] = _LINK.host
-    """Address of the module, or of the gateway in front of it."""
-    port: Annotated[int, Field(ge=1, le=65535)] = _LINK.port
-    """TCP port; 802 is customary with TLS."""
-    device_id: Annotated[int, Field(ge=0, le=255)] = _LINK.device_id
-    """Modbus unit id."""
-    register_map: InputFile
-    """Register map that the module speaks."""
-    word_order: Literal["big", "little"] | None = None
-    """Order of the words of a value of several registers; absent: as the map says."""
-    window: Annotated[int, Field(ge=1, le=64)] | None = None
-    """Requests in flight over TCP; absent: found by trials, up to 64; 16 or 1 where one fails."""
-    max_registers_per_request: Annotated[int, Field(ge=1, le=125)] = _LINK.max_registers
-    """Registers asked for at once; some gateways allow fewer than 125."""
-    pause_between_requests_ms: NotNegative = _LINK.pause_s * 1e3
-    """Rest that a slow device needs between requests."""
-    timeout_ms: Positive = _LINK.timeout_s * 1e3
-    """An answer later than this closes the connection."""
-    tls: TlsSection | None = None
-    """Encrypted link; absent: plain Modbus TCP."""
-
-    @model_validator(mode="after")
-    def _transport_has_what_it_needs(self) -> Self:
-        if (self.transport == "rtu") != (self.serial is not None):
-            raise ValueError("`serial` belongs to `transport: rtu`, and to no other")
-        if self.transport == "tls" and self.tls is None:
-            raise ValueError("`transport: tls` needs `tls` with its certificates")
-        if self.tls is not None and self.transport not in ("tcp", "tls"):
-            raise ValueError(f"`tls` does not go with `transport: {self.transport}`")
-        return self
 
 
 ErrorPercent = Annotated[float, Field(ge=0, le=10)]

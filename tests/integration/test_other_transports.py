@@ -33,12 +33,12 @@ def reached(kind: str, told: dict[str, Any], authority: Authority | None) -> dic
     """The section `module` of a cell that reaches the simulator."""
     if kind == "rtu":
         line = {"device": told["serial"], "baudrate": 115_200, "parity": "none", "stop_bits": 2}
-        return {"transport": kind, "port": 502, "serial": line}
+        return {"transport": kind, "window": None, "port": 502, "serial": line}
     if authority is None:
-        return {"transport": kind}
+        return {"transport": kind, "window": None}
     certificate, key = authority.issue("service")
     files = {"ca_certificate": str(authority.file), "certificate": str(certificate), "key": str(key)}
-    return {"transport": kind, "tls": {**files, "server_name": "module.test"}}
+    return {"transport": kind, "window": None, "tls": {**files, "server_name": "module.test"}}
 
 
 @pytest.mark.parametrize("kind", ["tls", "udp", "rtu_over_tcp", "rtu"])

@@ -18,7 +18,7 @@ from impactcell.service.factory import module_link
 from impactcell.settings import read_cell, read_cells
 from impactcell.settings.cells import read_register_map
 from impactcell.settings.judgement import judge_cell
-from impactcell.settings.sections import ModuleSection
+from impactcell.settings.module_section import ModuleSection
 
 ROOT = Path(__file__).resolve().parents[3]
 PAGE = (ROOT / "docs" / "how-to" / "another-module.md").read_text(encoding="utf-8")
@@ -82,11 +82,59 @@ def test_the_registers_of_the_page_are_registers() -> None:
         ({"transport": "udp", "tls": {"ca_certificate": str(SHIPPED)}}, "does not go with"),
         ({"transport": "ascii"}, "transport"),
         ({"transport": "rtu", "serial": {"device": "x", "parity": "mark"}}, "parity"),
+        (
+            {"window": 16, "pause_between_requests_ms": 5.0},
+            "`window: 16` sends so many requests at once, `pause_between_requests_ms: 5` lets the module",
+        ),
+        (
+            {"transport": "udp", "window": 4},
+            "`window: 4` belongs to `transport: tcp`; `udp` has one request in flight: leave it out",
+        ),
+        (
+            {"transport": "rtu", "serial": {"device": "x"}, "device_id": 0},
+            "`device_id: 0` asks all and is answered by none on a serial line; give the module's own, 1 to",
+        ),
+        (
+            {"transport": "rtu", "serial": {"device": "x"}, "device_id": 248},
+            "`device_id: 248` is reserved on",
+        ),
+        (
+            {"tls": {"ca_certificate": str(SHIPPED), "key": str(SHIPPED)}},
+            "`key` is of no use without `certificate`; name both, or leave it out",
+        ),
     ],
 )
 def test_what_does_not_go_together_is_refused(module: dict[str, Any], told: str) -> None:
     with pytest.raises(ValidationError, match=told):
         ModuleSection.model_validate({"register_map": SHIPPED, **module})
+
+
+@pytest.mark.parametrize(
+    "module",
+    [
+        {"window": 1, "pause_between_requests_ms": 5.0},
+        {"transport": "udp", "window": 1},
+        {"transport": "rtu", "serial": {"device": "x"}, "device_id": 247},
+        {"device_id": 255, "window": 64},
+        {"transport": "rtu_over_tcp", "device_id": 0},
+        {"tls": {"ca_certificate": str(SHIPPED), "certificate": str(SHIPPED)}},
+    ],
+)
+def test_what_goes_together_is_taken(module: dict[str, Any]) -> None:
+    ModuleSection.model_validate({"register_map": SHIPPED, **module})
+
+
+def test_cells_behind_one_gateway_have_one_request_in_flight(tmp_path: Path) -> None:
+    first = cell_file(tmp_path, "a", window=16)
+    with pytest.raises(SettingsError) as caught:
+        read_cells([first, cell_file(tmp_path, "b", device_id=2, window=1)])
+    told = (
+        f"`window: 16` is for a module with an endpoint of its own; {tmp_path / 'b.yaml'} is behind the same"
+    )
+    assert str(caught.value).startswith(f"{first}:")
+    assert told in str(caught.value)
+    elsewhere = cell_file(tmp_path, "c", port=503, window=16)
+    assert len(read_cells([first, elsewhere])) == 2
 
 
 def test_cells_of_one_line_agree_about_it(tmp_path: Path) -> None:
