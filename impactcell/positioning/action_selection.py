@@ -172,7 +172,7 @@ def _neighbours(i: int, place: float, space: ActionSpace) -> list[tuple[float, S
         high = velocities[above] if longest[above] >= strokes[0] else velocities[i]
         between = np.linspace(velocities[max(i - 1, 0)], high, 2 * FINE + 1)
         return [(float(v), strokes) for v in space.velocity_raster.at_most(between)]
-    low = strokes[max(math.ceil(place) - 1, 0)]
+    low = min(strokes[max(math.ceil(place) - 1, 0)], longest[i])
     high = strokes[min(math.floor(place) + 1, strokes.size - 1)]
     between = np.linspace(low, min(high, longest[i]), FINE)
     return [(float(velocities[i]), space.stroke_raster.at_most(between))]
