@@ -1,9 +1,11 @@
 """The tap of least expected cost, first among the table's, then refined in its stroke or velocity."""
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impactcell.numerics.jit import compiled
 from impactcell.numerics.raster import Raster
@@ -19,6 +21,8 @@ from impactcell.records import Samples
 
 KEPT = 5  # taps of the table that are refined
 FINE = 11  # strokes tried between the neighbours of one of them, and again between the best two
+Allowed = Callable[[float, Samples], NDArray[np.bool_]]
+"""Which strokes (m) at a velocity (m/s) may be commanded."""
 
 
 class ActionSpace(NamedTuple):
@@ -132,11 +136,12 @@ def evaluate_actions(
 
 def select_action(
     remaining: float, table: Samples, value: ValueFunction, space: ActionSpace, scenarios: Scenarios,
-    goal: Goal, bound: float,
+    goal: Goal, bound: float, allowed: Allowed | None = None,
 ) -> tuple[SelectedAction | None, float]:  # fmt: skip
     """Tap of least cost with an overshoot probability within `bound`, and the least probability met.
 
-    The tap is None where none is within the bound. `table` and `value` as in `LookaheadTable`.
+    The tap is None where none is within the bound. `table` and `value` as in `LookaheadTable`; what is not
+    `allowed` counts as an overshoot.
     """
     best: SelectedAction | None = None
     least = 1.0
@@ -150,6 +155,8 @@ def select_action(
                 costs, risks, means = evaluate_actions(
                     velocity, fine, scenarios, remaining, fine_nodes(), goal, value
                 )
+                if allowed is not None:
+                    risks = np.where(allowed(velocity, fine), risks, 1.0)
                 least = min(least, float(risks.min()))
                 costs = np.where(risks <= bound, costs, np.inf)
                 n = int(costs.argmin())

@@ -42,6 +42,8 @@ STEEPEST = 3.0
 """Slope of the displacement over the stroke that is followed from one place to another."""
 OUTLOOK_LASTS = 3.0
 """So many times as much may have been learned before what comes later is told again."""
+MOST_GOALS = 12
+"""For which an outlook keeps the cost to go: near an end of the travel there is one for each target."""
 STILL_TO_LEARN = 0.02
 """Taps that the whole distance is worth beside what it costs: decides between taps that are otherwise alike,
 and is worth less than 2e-4 of an overshoot. Half a tap settles as fast, and overshoots more often."""
@@ -139,7 +141,7 @@ class Outlook:
 
     knowledge: Knowledge
     ahead: Samples
-    values: dict[float, ValueFunction] = field(default_factory=dict)
+    values: dict[Goal, ValueFunction] = field(default_factory=dict)
 
     def value(self, limits: PlannerLimits, caution: float, remaining: float) -> ValueFunction:
         """Cost to go at this caution, for a tap that starts at this distance (m) from the target.
@@ -148,9 +150,12 @@ class Outlook:
         way and one that hardly moves and teaches nothing, of which there could be many: the distance left
         has a small price of its own. The rest is worked out when it is first asked for.
         """
-        if caution not in self.values:
-            self.values[caution] = solve_value_function(self.ahead, coarse_nodes(), limits.goal(caution))
-        value = self.values[caution]
+        goal = limits.goal(caution)
+        if goal not in self.values:
+            if len(self.values) >= MOST_GOALS:
+                del self.values[next(iter(self.values))]
+            self.values[goal] = solve_value_function(self.ahead, coarse_nodes(), goal)
+        value = self.values[goal]
         left = value.step_m * np.arange(value.cost.size) / remaining
         return value._replace(cost=value.cost + STILL_TO_LEARN * left)
 

@@ -2,18 +2,19 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impactcell.errors import PositioningError
 from impactcell.numerics.raster import ANY_VALUE, Raster
 from impactcell.physics import Plant, free_motion
 from impactcell.positioning import model_hypotheses
-from impactcell.positioning.action_selection import select_action
+from impactcell.positioning.cautious_selection import LEAST_STEP_M, choose_action
 from impactcell.positioning.compiling import compile_planning
-from impactcell.positioning.displacement_quantiles import displacement_quantiles, parameter_scenarios
-from impactcell.positioning.dynamic_programming import nearer
+from impactcell.positioning.displacement_band import BAND_Z, displacement_band, tap_of
+from impactcell.positioning.displacement_quantiles import parameter_scenarios
 from impactcell.positioning.friction_along_stroke import StrokeFriction, update_stroke_friction
 from impactcell.positioning.lookahead_table import (
     LookaheadTable,
@@ -27,19 +28,11 @@ from impactcell.positioning.planner_posterior import PlannerPosterior
 from impactcell.positioning.posterior_update import update_posterior
 from impactcell.positioning.prediction_watch import score_of
 from impactcell.positioning.quadrature import Z
-from impactcell.positioning.safety_limits import largest_force
+from impactcell.positioning.safety_limits import PLANNED_SHARE, largest_force, room_m
 from impactcell.positioning.tap import Tap, Unreachable
 from impactcell.positioning.tap_model import model_of_tap
 from impactcell.records import Quality, Samples, Signature, TapPredictions
 
-CAUTION = (1.0, 20.0, 400.0)  # factors on the penalty of an overshoot, tried until a tap is within the bound
-SHARE_OF_A_STEP = 0.2
-"""Of the bound on overshoot, for a tap that only brings the part nearer, so that more is learned there."""
-WORTH_A_STEP = 0.05
-"""Of the remaining distance that such a tap has to come nearer by."""
-LEAST_STEP_M = 1e-6
-"""An encoder's resolution: a tap that is to move less is made only where there is no other."""
-BAND_Z = np.linspace(-3.29, 3.29, 67)  # 99.9 %; close together, since a displacement may fold over
 MOST_STILL = 10
 """Taps in a row that move nothing, after which the rest of the way is out of reach."""
 REMEMBERED = 64  # tables, of parts of different mass
@@ -67,6 +60,8 @@ class TapPlanner:
         Actuators on both ends: a part that went too far is struck back.
     velocity_raster, stroke_raster : Raster
         Velocities (m/s) and strokes (m) that can be commanded; no other tap is planned.
+    travel_m : tuple of float
+        Positions between which the part stays, along +1: none is chosen whose 99.9 % band ends beyond.
 
     Raises
     ------
@@ -83,6 +78,7 @@ class TapPlanner:
     two_sided: bool = False
     velocity_raster: Raster = ANY_VALUE
     stroke_raster: Raster = ANY_VALUE
+    travel_m: tuple[float, float] = (-math.inf, math.inf)
     _posterior: PlannerPosterior = field(init=False, repr=False)
     _gravity: float = field(init=False, repr=False)
     _limits: PlannerLimits = field(init=False, repr=False)
@@ -103,6 +99,8 @@ class TapPlanner:
         elif isinstance(plant, Mapping):
             plant = Plant(**plant)  # type: ignore[arg-type]
         self._gravity = plant.gravity_m_s2
+        if not self.travel_m[0] < self.travel_m[1]:
+            raise PositioningError(f"tap planner: travel_m must be in order, not {self.travel_m}")
         compile_planning()
         self._posterior = model_hypotheses.prior(
             plant.stiffness_n_per_m,
@@ -171,48 +169,13 @@ class TapPlanner:
             )
         part = self._part(mass_kg)
         place = np.array([position_m, math.copysign(1.0, remaining_m)])
-        scenarios = parameter_scenarios(self._posterior, Z, part, place)
-        least, lookahead = 1.0, self._lookahead(part, place)
-        if not lookahead.furthest_m > 0.0:
-            return Unreachable(
-                f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
-                f"moves a part of {mass_kg} kg at friction {self._posterior.mu_k:.3f}"
-            )
-        space = self._limits.space(self._posterior, part, lookahead.strokes)
-        table, hardly = lookahead.at(place), None
-        for caution in CAUTION:
-            action, safest = select_action(
-                distance, table, lookahead.outlook.value(self._limits, caution, distance), space,
-                scenarios, self._limits.goal(caution), self.overshoot_probability,
-            )  # fmt: skip
-            if action is not None and action.mean >= LEAST_STEP_M:
-                break
-            least, hardly = min(least, safest), hardly or action
-        else:
-            action, _ = select_action(
-                distance, table, nearer(distance), space,
-                scenarios, self._limits.goal(caution), SHARE_OF_A_STEP * self.overshoot_probability,
-            )  # fmt: skip
-            if action is None or action.mean < WORTH_A_STEP * distance:
-                action = hardly
-        if action is None:
-            return Unreachable(
-                f"{distance * 1e6:.1f} µm remain, and every tap for a part of {mass_kg:.3g} kg overshoots "
-                f"{self.tolerance_m * 1e6:.3g} µm with a probability above {self.overshoot_probability:.2g} "
-                f"(the safest with {least:.2g})"
-            )
-        moved = self._band(action.velocity_m_s, action.stroke_m, part, place)
-        return Tap(
-            velocity_m_s=action.velocity_m_s,
-            stroke_m=action.stroke_m,
-            direction=1 if remaining_m > 0.0 else -1,
-            expected_m=float(moved[BAND_Z.size // 2]),
-            lowest_m=float(moved.min()),
-            highest_m=float(moved.max()),
-            expected_taps=action.cost,
-            overshoot_probability=action.overshoot,
-            position_m=position_m,
-        )
+        room = room_m(self.travel_m, position_m, place[1])
+        if distance - room >= self.tolerance_m:
+            return Unreachable(f"the target lies {(distance - room) * 1e3:.3f} mm beyond the travel")
+        tap = self._choose(distance, part, place)
+        if isinstance(tap, Tap) and tap.highest_m > room:
+            return self._choose(distance, part, place, room)
+        return tap
 
     def observe(self, tap: Tap, moved_m: float, mass_kg: float) -> None:
         """Learn from a tap that moved the part by `moved_m`, positive along the tap.
@@ -227,7 +190,7 @@ class TapPlanner:
         self._still = self._still + 1 if abs(moved_m) < LEAST_STEP_M else 0
         part = self._part(mass_kg)
         place = np.array([tap.position_m, float(tap.direction)])
-        band = self._band(tap.velocity_m_s, tap.stroke_m, part, place)
+        band = displacement_band(self._posterior, tap.velocity_m_s, np.array([tap.stroke_m]), part, place)[0]
         if np.isfinite(band).all() and band[BAND_Z.size // 2] > 0.0:
             self._posterior = with_score(self._posterior, score_of(moved_m, band, BAND_Z))
         model = model_of_tap(tap, self._posterior, part)
@@ -266,6 +229,41 @@ class TapPlanner:
             tap.velocity_m_s, tap.stroke_m, stiffest(self._posterior), mass_kg, self._gravity
         )
 
+    def _choose(
+        self, distance: float, part: Samples, place: Samples, room: float = math.inf
+    ) -> Tap | Unreachable:
+        """Choose a tap whose band ends within the room (m) that the travel leaves; inf: any tap."""
+        lookahead = self._lookahead(part, place)
+        if not lookahead.furthest_m > 0.0:
+            return Unreachable(
+                f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
+                f"moves a part of {part[0]} kg at friction {self._posterior.mu_k:.3f}"
+            )
+        space = self._limits.space(self._posterior, part, lookahead.strokes)
+        scenarios = parameter_scenarios(self._posterior, Z, part, place)
+
+        def stays(velocity: float, strokes: Samples) -> NDArray[np.bool_]:
+            band = displacement_band(self._posterior, velocity, strokes, part, place)
+            within: NDArray[np.bool_] = band.max(axis=1) <= PLANNED_SHARE * room
+            return within
+
+        # What is in place ends with the travel: the middle of what is left of it is aimed at.
+        cut = 0.5 * max(distance + self.tolerance_m - room, 0.0)
+        limits = replace(self._limits, tolerance_m=self.tolerance_m - cut)
+        action, least = choose_action(
+            distance - cut, lookahead, limits, space, scenarios, None if math.isinf(room) else stays
+        )
+        if action is None:
+            every = f"{distance * 1e6:.1f} µm remain, and every tap for a part of {part[0]:.3g} kg overshoots"
+            if room < math.inf:
+                ends = f"or may pass the end of the travel, {room * 1e3:.3f} mm away"
+                return Unreachable(f"{every} {ends}; set a target further from it, or a wider tolerance")
+            return Unreachable(
+                f"{every} {self.tolerance_m * 1e6:.3g} µm with a probability above "
+                f"{self.overshoot_probability:.2g} (the safest with {least:.2g})"
+            )
+        return tap_of(action, self._posterior, part, place)
+
     def _is_stuck(self, remaining_m: float) -> bool:
         """Whether too many taps in a row have left the part where it lies; who asks again begins anew."""
         is_same = abs(remaining_m - self._asked_m) < LEAST_STEP_M
@@ -277,14 +275,6 @@ class TapPlanner:
         return np.concatenate(
             [[mass_kg, self._gravity], [] if self._profile is None else self._profile.warp()]
         )
-
-    def _band(self, velocity: float, stroke: float, part: Samples, place: Samples) -> Samples:
-        """Displacements (m) of a tap at the nodes `BAND_Z`."""
-        moved = np.empty((1, BAND_Z.size))
-        scenarios = parameter_scenarios(self._posterior, BAND_Z, part, place)
-        displacement_quantiles(velocity, np.array([stroke]), scenarios, BAND_Z, moved)
-        band: Samples = moved[0]
-        return band
 
     def _lookahead(self, part: Samples, place: Samples) -> LookaheadTable:
         """Outlook for this part, made anew where the posterior has moved on."""

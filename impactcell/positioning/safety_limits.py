@@ -70,6 +70,12 @@ def allowed_strokes(
     return strokes
 
 
+def room_m(travel_m: tuple[float, float], position_m: float, direction: float) -> float:
+    """Say how far (m) a part at this position may go in this direction, +1 or -1."""
+    low, high = travel_m
+    return high - position_m if direction > 0.0 else position_m - low
+
+
 def check_tap(tap: Tap, limits: SafetyLimits, position_m: float, force_n: float, cell: str = "cell") -> Tap:
     """Return the tap, if the cell allows it.
 
@@ -100,9 +106,9 @@ def check_tap(tap: Tap, limits: SafetyLimits, position_m: float, force_n: float,
         raise PositioningError(
             f"{cell}: a tap with up to {force_n:.0f} N is not allowed, the limit is {limits.force_n:.0f} N"
         )
-    low, high = limits.travel_m
-    furthest = position_m + tap.direction * tap.highest_m
-    if not low <= furthest <= high:
+    if not tap.highest_m <= room_m(limits.travel_m, position_m, tap.direction):
+        low, high = limits.travel_m
+        furthest = position_m + tap.direction * tap.highest_m
         raise PositioningError(
             f"{cell}: a tap that may bring the part to {furthest * 1e3:.3f} mm is not allowed, "
             f"its travel is {low * 1e3:g} to {high * 1e3:g} mm"

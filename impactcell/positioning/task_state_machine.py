@@ -190,7 +190,7 @@ def begin_task(
     fresh = TaskState(TaskPhase.IDLE, target_m, position_m, mass_kg, start_m=position_m)
     begun = _plan(fresh, cell, planner)
     if begun.phase is TaskPhase.FAULTED:
-        raise PositioningError(f"{name}: {begun.reason}")
+        raise PositioningError(begun.reason)
     return begun
 
 

@@ -225,4 +225,5 @@ def tap_planner(
         two_sided=limited.two_sided,
         velocity_raster=commanded_values(registers, "command_velocity"),
         stroke_raster=commanded_values(registers, "command_stroke"),
+        travel_m=limits.travel_m,
     )
