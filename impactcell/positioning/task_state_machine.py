@@ -7,6 +7,7 @@
                         └── abort ──► IDLE       ├── abort ──► IDLE
                         └── failed ─► FAULTED    └── failed, moved nothing, out of its band ──► FAULTED
 
+A part that lies within the tolerance is in place however it got there; how it did is said with it.
 `begin_task` may follow IDLE, SETTLED and FAULTED. Every transition is a pure function of task and event,
 but for the planner, which learns from each observation.
 """
@@ -219,19 +220,26 @@ def observed(sequence: TaskState, cell: PositioningCell, planner: TapPlanner, po
         size=moved - tap.expected_m,
         size_std=half / BAND_SIGMAS,
     )
-    if moved < cell.resolution_m:
-        return failed(lies, f"{cell.name}: tap {sequence.taps} moved nothing", evidence)
-    below, above = tap.lowest_m - cell.resolution_m, tap.highest_m + cell.resolution_m
-    if not below <= moved <= above:
-        return failed(
-            lies,
-            f"{cell.name}: tap {sequence.taps} moved the part by {moved * 1e3:.4f} mm, outside "
-            f"the 99.9 % band of {tap.lowest_m * 1e3:.4f} to {tap.highest_m * 1e3:.4f} mm",
-            evidence,
-        )
+    miss = _miss(sequence.taps, tap, moved, cell.resolution_m)
+    if abs(lies.remaining_m) <= planner.tolerance_m:
+        return replace(lies, phase=TaskPhase.SETTLED, reason=f"in place; {miss}" if miss else "in place")
+    if miss:
+        return failed(lies, f"{cell.name}: {miss}", evidence)
     if sequence.taps >= MOST_TAPS:
         return failed(lies, f"{cell.name}: not in place after {MOST_TAPS} taps")
     return _plan(lies, cell, planner)
+
+
+def _miss(number: int, tap: Tap, moved_m: float, resolution_m: float) -> str:
+    """Say how the outcome of a tap is not the one foretold; nothing where it is."""
+    if moved_m < resolution_m:
+        return f"tap {number} moved nothing"
+    if tap.lowest_m - resolution_m <= moved_m <= tap.highest_m + resolution_m:
+        return ""
+    return (
+        f"tap {number} moved the part by {moved_m * 1e3:.4f} mm, outside "
+        f"the 99.9 % band of {tap.lowest_m * 1e3:.4f} to {tap.highest_m * 1e3:.4f} mm"
+    )
 
 
 def failed(sequence: TaskState, reason: str, evidence: Evidence | None = None) -> TaskState:

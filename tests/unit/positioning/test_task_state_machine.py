@@ -12,6 +12,7 @@ from impactcell.numerics.raster import Raster
 from impactcell.positioning import SafetyLimits, Tap, TapPlanner
 from impactcell.positioning.safety_limits import check_tap
 from impactcell.positioning.task_state_machine import (
+    MOST_TAPS,
     PositioningCell,
     TaskPhase,
     TaskState,
@@ -132,6 +133,33 @@ def test_a_displacement_outside_its_band_stops_with_evidence(side: float) -> Non
     assert stopped.evidence.size == pytest.approx(moved - tap.expected_m)
     inside = observed(sequence, CELL, made, sequence.position_m + 0.999 * tap.expected_m)
     assert inside.phase in {TaskPhase.COMMANDING, TaskPhase.SETTLED}
+
+
+def test_a_part_on_its_target_is_in_place_however_it_got_there_and_the_miss_is_told() -> None:
+    """Before, "the part is not in place" was said of one that lay on its target."""
+    sequence, made = waiting()
+    tap = sequence.tap
+    assert tap is not None
+    watched = made.posterior.watch.evidence
+    short = replace(tap, expected_m=4e-3, lowest_m=3e-3, highest_m=5e-3)
+    arrived = observed(replace(sequence, tap=short), CELL, made, sequence.target_m)
+    assert arrived.phase is TaskPhase.SETTLED
+    assert arrived.outcome.settled
+    assert arrived.reason == (
+        "in place; tap 1 moved the part by 18.0000 mm, outside the 99.9 % band of 3.0000 to 5.0000 mm"
+    )
+    assert made.posterior.taps == 1
+    assert made.posterior.watch.evidence != watched
+
+
+def test_in_place_with_the_last_tap_there_may_be() -> None:
+    sequence, made = waiting()
+    arrived = observed(replace(sequence, taps=MOST_TAPS), CELL, made, sequence.target_m)
+    assert arrived.phase is TaskPhase.SETTLED
+    assert sequence.tap is not None
+    on_its_way = sequence.position_m + sequence.tap.expected_m
+    stopped = observed(replace(sequence, taps=MOST_TAPS), CELL, made, on_its_way)
+    assert stopped.reason == "press 3: not in place after 200 taps"
 
 
 @pytest.mark.parametrize("half_m", [0.0, 1e-12])
