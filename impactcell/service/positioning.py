@@ -66,7 +66,7 @@ class PositioningTask:
         """Of the last tasks, in their order."""
         self._wake = asyncio.Event()
         self._predictions = self._planner.predictions
-        self._plc_target: int | None = None  # sequence of the one that was looked at last
+        self._plc_target: tuple[int, int] | None = None  # session and sequence of the one looked at last
         self._begun_target: tuple[int, int] | None = None  # session and sequence of the one whose task runs
         self._at_rest = asyncio.Event()  # no tap is under way, also none that was aborted
         self._at_rest.set()
@@ -201,19 +201,19 @@ class PositioningTask:
             await asyncio.sleep(WATCH_S)
 
     async def _read_plc_target(self) -> None:
-        """Start a task where the PLC has raised the sequence of its target.
+        """Start a task where the PLC has raised the sequence of its target; a 0 is none, and changes nothing.
 
         After a restart the module may still show one whose task has ended: nobody wants that again. One that
         was not over goes on from where the part lies.
         """
         block = self._module.status_block
         shown = None if block is None else block.positioning
-        if block is None or shown is None or shown.target_sequence == self._plc_target:
-            return
-        if not self._module.status.connected:
+        if block is None or shown is None or not self._module.status.connected:
             return  # it is still there once the link is up again
-        is_first, self._plc_target = self._plc_target is None, shown.target_sequence
         target = (block.session, shown.target_sequence)
+        if target == self._plc_target:
+            return
+        is_first, self._plc_target = self._plc_target is None, target
         if is_first and block.session and target == self._worker.handled_target:
             self._log.info("the PLC's target was done with before the restart; it is not begun again")
         elif shown.target_sequence:
@@ -262,7 +262,7 @@ class PositioningTask:
             if report is None:
                 self._set_sequence(task_state_machine.failed(waiting, fault))
                 return
-            if report.target_sequence != self._plc_target and self._plc_target is not None:
+            if self._plc_target is not None and report.target_sequence not in (0, self._plc_target[1]):
                 # Another part lies there by now: its position says nothing of the tap.
                 self._set_sequence(task_state_machine.aborted(waiting, BY_PLC))
                 return
