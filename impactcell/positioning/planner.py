@@ -254,13 +254,16 @@ class TapPlanner:
             distance - cut, lookahead, limits, space, scenarios, None if math.isinf(room) else stays
         )
         if action is None:
-            every = f"{distance * 1e6:.1f} µm remain, and every tap for a part of {part[0]:.3g} kg overshoots"
             if room < math.inf:
-                ends = f"or may pass the end of the travel, {room * 1e3:.3f} mm away"
-                return Unreachable(f"{every} {ends}; set a target further from it, or a wider tolerance")
+                return Unreachable(
+                    f"{distance * 1e6:.1f} µm remain, and every tap for a part of {part[0]:.3g} kg "
+                    f"overshoots or may pass the end of the travel, {room * 1e3:.3f} mm away; set a target "
+                    "further from it, or a wider tolerance"
+                )
             return Unreachable(
-                f"{every} {self.tolerance_m * 1e6:.3g} µm with a probability above "
-                f"{self.overshoot_probability:.2g} (the safest with {least:.2g})"
+                f"{distance * 1e6:.1f} µm remain, and every tap for a part of {part[0]:.3g} kg overshoots "
+                f"{self.tolerance_m * 1e6:.3g} µm with a probability above {self.overshoot_probability:.2g} "
+                f"(the safest with {least:.2g})"
             )
         return tap_of(action, self._posterior, part, place)
 

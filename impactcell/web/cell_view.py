@@ -9,6 +9,7 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
+from impactcell.german.positioning_reasons import german_positioning_reason
 from impactcell.quantities import BY_PATH, CYCLE, MODULE
 from impactcell.records import Alarm, Channel, ModuleStatus, Quality, Samples, Snapshot
 from impactcell.records.quantity import Quantity, S
@@ -249,12 +250,12 @@ def _published(quantities: Iterable[Quantity[S]], source: S) -> tuple[dict[str, 
 
 def _beside_values(snapshot: Snapshot) -> dict[str, Any]:
     """Give what is said of a cycle beside its published values."""
+    positioning = snapshot.positioning.reason
     reasons = {
         "mu_s": snapshot.friction.mu_s.reason,
         "wear": snapshot.wear.reason,
         "batch": snapshot.batch.reason,
         "signature": snapshot.signature.reason,
-        "positioning": snapshot.positioning.reason,
     }
     return {
         "time_ms": snapshot.time_ns // 1_000_000,
@@ -262,7 +263,9 @@ def _beside_values(snapshot: Snapshot) -> dict[str, Any]:
         "estimator": snapshot.friction.estimator.value,
         "model": {language: Messages(language).model(snapshot.model_name) for language in LANGUAGES},
         "reasons": {
-            "en": {name: english_reason(text) for name, text in reasons.items()},
-            "de": {name: german_reason(text) for name, text in reasons.items()},
+            "en": {name: english_reason(text) for name, text in reasons.items()}
+            | {"positioning": positioning},
+            "de": {name: german_reason(text) for name, text in reasons.items()}
+            | {"positioning": german_positioning_reason(positioning)},
         },
     }

@@ -1,6 +1,7 @@
 """PositioningFault: a positioning task has ended before the part was in place."""
 
 from impactcell.alarms.rule import NO_EVIDENCE, AlarmRule, Message, RuleResult, RuleSettings
+from impactcell.german.positioning_reasons import german_positioning_reason
 from impactcell.records import Evidence
 
 NAME = "PositioningFault"
@@ -9,10 +10,11 @@ NAME = "PositioningFault"
 
 def result(reason: str, evidence: Evidence = NO_EVIDENCE) -> RuleResult:
     """Say why the task has ended; an empty reason says that nothing is wrong."""
+    german = german_positioning_reason(reason)
     message = Message(
         f"The part is not in place, positioning has stopped: {reason}. "
         "Clear the cause, then set the target again.",
-        f"Das Teil ist nicht in Position, die Positionierung hat angehalten: {reason}. "
+        f"Das Teil ist nicht in Position, die Positionierung hat angehalten: {german}. "
         "Ursache beheben, danach das Ziel neu setzen.",
     )
     return RuleResult(NAME, bool(reason), message, evidence)

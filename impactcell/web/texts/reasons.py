@@ -67,8 +67,6 @@ GERMAN: Final = {
         "der Vergleich wird noch gelernt, ein weiterer Zyklus",
     r"the reference is being learned, (\d+) more cycles":
         r"der Vergleich wird noch gelernt, \1 weitere Zyklen",
-    r"aborted by (.+)": r"abgebrochen von \1",
-    r"in place": "am Ziel",
     **TAP_REASONS,
 }  # fmt: skip
 """Why a value is doubted, and why a tap shows none, as patterns; what is in none of them stays English."""

@@ -69,7 +69,8 @@ def test_what_lies_outside_the_calibration_is_said_in_german() -> None:
           "Vergangenheit von nun an gesehen")),
         ("since cycle 188 mu_s goes by -0.00899 ± 0.0021 in 1000 cycles, 0.0133 before",
          "seit Zyklus 188 ändert sich µs um -0,00899 ± 0,0021 in 1000 Zyklen, davor um 0,0133"),
-        ("what nobody has translated; in place", "what nobody has translated; am Ziel"),
+        ("what nobody has translated; mu_s is missing, the cycle is not used",
+         "what nobody has translated; µs fehlt, der Zyklus wird nicht verwendet"),
         ("", ""),
     ],
 )  # fmt: skip
