@@ -8,7 +8,6 @@ the module or the link does: that is said in its `status` and in the `faults` of
 import asyncio
 import contextlib
 import logging
-import time
 from collections.abc import AsyncGenerator, Callable
 from dataclasses import replace
 from types import TracebackType
@@ -20,6 +19,7 @@ from impactcell.fieldbus.backoff import Backoff
 from impactcell.fieldbus.capture_reader import CaptureReader
 from impactcell.fieldbus.capture_ring import cycles_after
 from impactcell.fieldbus.cycle_choice import CycleChoice
+from impactcell.fieldbus.cycle_dates import CycleDates
 from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.fetched_capture import NotFetched
 from impactcell.fieldbus.identity import IdentityCheck
@@ -32,7 +32,7 @@ from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.fieldbus.status_reader import StatusReader
 from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.process.cell_logger import CellLogger
-from impactcell.records import Capture, CycleId, ModuleStatus
+from impactcell.records import CycleId, ModuleStatus
 
 __all__ = ["ModuleAcquisition", "ModuleStatus", "ReceivedCycle"]
 
@@ -74,6 +74,7 @@ class ModuleAcquisition:
         self._reader = CaptureReader(cell, self.register_client)
         self._numbers = CycleNumbers.of(registers["cycle_counter"].kind)
         self._taken = TakenCycles(None, 0, registers.slots)
+        self._dates = CycleDates(registers, self._log)
         self._status = ModuleStatus()
         self._on_change = on_change
         self._ready = asyncio.Event()
@@ -174,7 +175,8 @@ class ModuleAcquisition:
             choice.record_success()
             if fetched.readable:  # not for the status block alone, which says nothing of the window
                 backoff.reset()
-            capture = self._dated(replace(fetched.capture, session=target.cycle_id.session))
+            capture = replace(fetched.capture, session=target.cycle_id.session)
+            capture = self._dates.dated(capture, readable=fetched.readable)
             last = taken.last
             schedule.update(
                 1e-9 * fetched.capture.time_ns or loop.time(),
@@ -189,10 +191,6 @@ class ModuleAcquisition:
             yield received
             if taken.last == newest:  # nothing waits behind it
                 await asyncio.sleep(schedule.delay_s(loop.time()))
-
-    def _dated(self, capture: Capture) -> Capture:
-        """Date a capture of a module without a clock: it was made when it was read, for all one knows."""
-        return capture if "cycle_time" in self.registers else replace(capture, time_ns=time.time_ns())
 
     async def connect_once(self) -> StatusBlock:
         """Connect, check who answers, and read the status block; raises FieldbusError where that fails."""

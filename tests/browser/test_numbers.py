@@ -132,3 +132,21 @@ def test_an_alarm_that_has_cleared_says_what_it_said(browser: Browser, language:
         return place.textContent;
     """
     assert browser.run(script) == said
+
+
+def test_an_alarm_whose_time_is_not_known_is_shown_before_those_that_are_over(browser: Browser) -> None:
+    load(browser, "en")
+    script = """
+        const evidence = { compared: {}, size: null, change_cycle: null };
+        const seen = { evidence, enabled: true, shelved: "unshelved", active: false, acknowledged: true };
+        const open = { ...seen, active: true, acknowledged: false };
+        const alarms = [
+            { ...seen, name: "BatchShift", message: { en: "" }, time_ms: 0 },
+            { ...seen, name: "DeviantCycle", message: { en: "friction is off" }, time_ms: 1e12 },
+            { ...open, name: "WearLimit", message: { en: "worn" }, time_ms: 0 },
+        ];
+        const place = document.createElement("div");
+        showAlarm(place, alarms, "none");
+        return place.textContent;
+    """
+    assert browser.run(script) == "▲ Wear limit (not acknowledged): worn"

@@ -95,7 +95,7 @@ export function showFriction(root, card) {
 
 /** The alarm that matters most: open before cleared, then the latest. */
 export function lastAlarm(alarms) {
-  const told = alarms.filter((alarm) => alarm.time_ms > 0 && alarm.message.en);
+  const told = alarms.filter((alarm) => alarm.message.en);
   const rank = (alarm) => (alarm.active ? 2 : 0) + (alarm.acknowledged ? 0 : 1);
   return told.sort((a, b) => rank(b) - rank(a) || b.time_ms - a.time_ms)[0];
 }
