@@ -10,7 +10,8 @@ from impactcell.opcua.host_interface import UserDirectory
 from impactcell.scada import Actor, Role
 
 IDLE_S: Final = 1800.0
-"""A session without a request for so long is over; a page that is open and gets its frames counts as one."""
+"""A session without a request for so long is over; a page that is open counts as one: it gets its frames, or
+asks now and then while its tab is behind others."""
 LONGEST_S: Final[Mapping[Role, float]] = {
     Role.OBSERVER: 30 * 86_400.0,
     Role.OPERATOR: 12 * 3600.0,

@@ -17,7 +17,9 @@ from impactcell.scada import Role
 from impactcell.scada.users import User, write_users
 from impactcell.web import CellFacts, CellNews, PageServer, PageSettings
 from impactcell.web.interface import Freshness
+from impactcell.web.sessions import IDLE_S
 from tests.browser.chromium import PHONE, Browser, need_chromium
+from tests.patience import PATIENCE_S
 from tests.snapshots import make_capture, make_snapshot
 from tests.unit.web.page import PASSWORD, Backend, raised
 
@@ -32,6 +34,22 @@ LATER = """
     };
 """
 """A minute passes in the browser."""
+SEEN = """
+    const [isSeen] = arguments;
+    const told = { visibilityState: isSeen ? "visible" : "hidden", hidden: !isSeen };
+    for (const [name, value] of Object.entries(told)) {
+        Object.defineProperty(document, name, { configurable: true, get: () => value });
+    }
+    document.dispatchEvent(new Event("visibilitychange"));
+"""
+"""The tab comes in front of the others, or behind them."""
+LOOKED = "setTimeout(arguments[0], 1000)"
+"""Each second the page looks whether it has heard something; timers come in the order they are due in."""
+ASK = """
+    const done = arguments[arguments.length - 1];
+    const asked = fetch("/alarms/rows", { signal: AbortSignal.timeout(arguments[0]) });
+    asked.then((answer) => done(answer.status), (error) => done(error.name));
+"""
 
 
 class Relay:
@@ -140,6 +158,80 @@ async def test_a_link_that_falls_silent(relay: Relay, browser: Browser) -> None:
     relay.thaw()
     back = lambda: states(browser) == {"● live"} and not browser.all("#offline:not([hidden])")  # noqa: E731
     await asyncio.to_thread(browser.until, back, "cells that are live again")
+
+
+async def test_of_many_tabs_only_the_one_in_front_holds_a_connection(
+    server: PageServer, relay: Relay, browser: Browser
+) -> None:
+    """A browser opens six to a host, whatever the number of tabs."""
+    await asyncio.to_thread(enter, browser, relay)
+    first = browser.driver.current_window_handle
+    viewed = lambda: server.feed.viewers == 1  # noqa: E731
+    try:
+        for _ in range(7):
+            await asyncio.to_thread(browser.run, SEEN, False)
+            await asyncio.to_thread(browser.driver.switch_to.new_window, "tab")
+            await asyncio.to_thread(browser.open, f"http://127.0.0.1:{relay.port}/")
+            await asyncio.to_thread(
+                browser.until, lambda: states(browser) == {"● live"}, "cells that are live"
+            )
+            await asyncio.to_thread(browser.until, viewed, "one stream")
+        asked = await asyncio.to_thread(browser.driver.execute_async_script, ASK, 1e3 * PATIENCE_S)
+        assert asked == 200
+    finally:
+        for tab in set(browser.driver.window_handles) - {first}:
+            browser.driver.switch_to.window(tab)
+            browser.driver.close()
+        browser.driver.switch_to.window(first)
+
+
+async def test_a_tab_that_comes_in_front_again_is_as_of_now(
+    server: PageServer, relay: Relay, browser: Browser
+) -> None:
+    await asyncio.to_thread(enter, browser, relay)
+    await asyncio.to_thread(browser.run, SEEN, False)
+    await asyncio.to_thread(browser.until, lambda: not server.feed.viewers, "no stream")
+    for cell in CELLS:
+        server.feed.put(CellNews(cell, status=LOST, freshness=Freshness.LOST))
+    await asyncio.to_thread(browser.run, LATER)
+    await asyncio.to_thread(browser.driver.execute_async_script, LOOKED)
+    assert not browser.all("#offline:not([hidden])")
+    assert states(browser) == {"● live"}
+    await asyncio.to_thread(browser.run, SEEN, True)
+    assert "● live" not in states(browser)
+    now = lambda: states(browser) == {"✕ no connection to the module"}  # noqa: E731
+    await asyncio.to_thread(browser.until, now, "the cells as they are")
+    await asyncio.to_thread(browser.driver.execute_async_script, LOOKED)
+    assert not browser.all("#offline:not([hidden])")
+
+
+async def test_a_tab_that_comes_in_front_again_without_the_service_says_so(
+    server: PageServer, relay: Relay, browser: Browser
+) -> None:
+    await asyncio.to_thread(enter, browser, relay)
+    await asyncio.to_thread(browser.run, SEEN, False)
+    await asyncio.to_thread(browser.until, lambda: not server.feed.viewers, "no stream")
+    await relay.cut()
+    await asyncio.to_thread(browser.run, SEEN, True)
+    await asyncio.to_thread(browser.until, lambda: is_offline(browser), "that nothing is heard")
+    await relay.open()
+    back = lambda: states(browser) == {"● live"} and not browser.all("#offline:not([hidden])")  # noqa: E731
+    await asyncio.to_thread(browser.until, back, "cells that are live again")
+
+
+async def test_a_tab_behind_others_is_not_logged_out(
+    server: PageServer, relay: Relay, browser: Browser
+) -> None:
+    watch = "const ask = fetch; globalThis.fetch = (...what) => { is_used = true; return ask(...what); };"
+    await asyncio.to_thread(enter, browser, relay)
+    await asyncio.to_thread(browser.run, SEEN, False)
+    await asyncio.to_thread(browser.run, f"globalThis.is_used = false; {watch}")
+    await asyncio.to_thread(browser.driver.execute_async_script, LOOKED)
+    assert not browser.run("return is_used")
+    await asyncio.to_thread(browser.run, LATER.replace("60000", f"{1e3 * IDLE_S / 2}"))
+    used = lambda: browser.run("return is_used")  # noqa: E731
+    await asyncio.to_thread(browser.until, used, "that the session is in use")
+    assert not server.feed.viewers
 
 
 async def test_the_notice_stays_in_sight(relay: Relay, browser: Browser) -> None:

@@ -145,20 +145,33 @@ function showOffline(since) {
   notice.textContent = `✕ ${texts.offline} (${since.toLocaleTimeString(language)})`;
   notice.hidden = false;
   document.body.classList.add("is-offline");
+  showUnknown(texts.offline);
+}
+
+/** What was said of the cells is from before. */
+function showUnknown(why) {
   for (const place of document.querySelectorAll('[data-field="state"]')) {
     place.className = "state plain";
     place.textContent = `? ${texts.unknown}`;
-    place.title = texts.offline;
+    place.title = why;
   }
 }
 
 const SILENCE_MS = 25000; // two and a half signs of life: a link that is cut without a word ends no stream
+const USED_MS = 600000; // a tab behind others asks so often, for its session to go on as that of one in front
 
-/** Keeps a stream open; the browser reconnects by itself, the end of a session leads to the login. */
+/**
+ * Keeps a stream open while the tab is in front, for a browser opens six connections to a host and no more;
+ * the browser reconnects by itself, the end of a session leads to the login.
+ */
 export function follow(address, handlers) {
   const openAlarms = new Map();
   const count = document.getElementById("open-alarms");
-  let source, heard = new Date();
+  let source, heard = new Date(), asked = heard;
+  const ask = () => {
+    asked = new Date();
+    return fetch("/alarms/rows", { method: "HEAD", redirect: "manual" }).catch(() => null);
+  };
   const hear = () => {
     heard = new Date();
     document.getElementById("offline").hidden = true;
@@ -166,9 +179,9 @@ export function follow(address, handlers) {
   };
   const lose = async () => {
     showOffline(heard);
-    const answer = await fetch("/alarms/rows", { redirect: "manual" }).catch(() => null);
+    const answer = await ask();
     if (answer && answer.status === 401) location.reload();
-    else if (source.readyState === EventSource.CLOSED) setTimeout(() => location.reload(), 5000);
+    else if (!document.hidden && source.readyState === EventSource.CLOSED) setTimeout(() => location.reload(), 5000);
   };
   const heardOf = { alive() {} };
   heardOf.alarms = (cell) => {
@@ -185,6 +198,7 @@ export function follow(address, handlers) {
   };
   function connect() {
     source?.close();
+    asked = new Date();
     source = new EventSource(address);
     source.addEventListener("open", hear);
     source.addEventListener("error", lose);
@@ -194,11 +208,18 @@ export function follow(address, handlers) {
       show(JSON.parse(event.data));
     });
   }
-  connect();
+  if (!document.hidden) connect();
+  document.addEventListener("visibilitychange", () => {
+    if (document.hidden) return source?.close();
+    showUnknown("");
+    connect();
+  });
   setInterval(() => {
-    if (new Date() - heard < SILENCE_MS) return;
+    const silent = new Date() - Math.max(heard, asked);
+    if (document.hidden && silent > USED_MS) ask();
+    if (document.hidden || silent < SILENCE_MS) return;
     showOffline(heard);
     if (source.readyState === EventSource.OPEN) connect();
   }, 1000);
-  addEventListener("pagehide", () => source.close());
+  addEventListener("pagehide", () => source?.close());
 }

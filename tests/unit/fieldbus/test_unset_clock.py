@@ -1,4 +1,4 @@
-"""A module whose clock is not set, as without a battery after power-up: its cycles have dates all the same."""
+"""A module whose clock is not set, as without a battery after power-up: its cycles have dates anyway."""
 
 import logging
 import time
