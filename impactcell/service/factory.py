@@ -145,6 +145,7 @@ def page_settings(cell: CellConfig, section: WebSection) -> PageSettings:
         section.studies_dir or cell.path.resolve().parent / "studies",
         section.certificate,
         section.key,
+        section.public_url,
     )
 
 

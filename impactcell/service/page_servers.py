@@ -62,10 +62,11 @@ async def served_pages(
                 log.warning("%s; no page for now", error)
                 continue
             stack.push_async_callback(asyncio.to_thread, page.stop)
-            if not (settings.is_encrypted or section.is_on_loopback):
+            if section.is_in_the_clear:
                 log.warning(
                     "page: http beyond loopback is allowed (web.allow_without_encryption): anybody can listen"
                 )
-            log.info("page at %s", page.endpoint)
+            behind = f", behind a proxy at {section.public_url}" if section.public_url else ""
+            log.info("page at %s%s", page.endpoint, behind)
             pages |= dict.fromkeys(servers, page)
         yield pages

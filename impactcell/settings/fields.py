@@ -97,6 +97,31 @@ def page_endpoint(value: str) -> str:
     return value.rstrip("/")
 
 
+def public_address(value: str) -> str:
+    """See that the address of a page behind a proxy is one, and write it as browsers do.
+
+    >>> public_address("https://Cells.plant.example:443/")
+    'https://cells.plant.example'
+    """
+    parts = urlsplit(value)
+    try:
+        host, port = parts.hostname or "", parts.port
+    except ValueError:
+        host, port = "", None
+    scheme_port = {"http": 80, "https": 443}.get(parts.scheme)
+    if scheme_port is None or not (host.isascii() and _is_host(host)) or port == 0 or "@" in parts.netloc:
+        raise ValueError(
+            "the address in the browser has scheme and host, and a port where it is not the usual one, "
+            "as in https://cells.plant.example"
+        )
+    if parts.path not in ("", "/") or parts.query or parts.fragment:
+        raise ValueError(
+            f"the address in the browser has no path here: give the page a host of its own, not {host}"
+        )
+    written = f"[{host}]" if ":" in host else host
+    return f"{parts.scheme}://{written}{f':{port}' if port not in (None, scheme_port) else ''}"
+
+
 def module_host(value: str) -> str:
     """See that a host is a name or an address alone, as a connection is opened to it.
 

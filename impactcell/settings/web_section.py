@@ -5,7 +5,7 @@ from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, model_validator
 
-from impactcell.settings.fields import InputFile, OutputDirectory, Section, page_endpoint
+from impactcell.settings.fields import InputFile, OutputDirectory, Section, page_endpoint, public_address
 
 
 class WebSection(Section):
@@ -13,6 +13,8 @@ class WebSection(Section):
 
     endpoint: Annotated[str, AfterValidator(page_endpoint)] = "http://127.0.0.1:8480"
     """Where browsers find it; an address other than loopback opens it to the network."""
+    public_url: Annotated[str, AfterValidator(public_address)] | None = None
+    """Address in the browser where a proxy is before the page; it then works there alone."""
     certificate: InputFile | None = None
     """Certificate (PEM) of the page, for https."""
     key: InputFile | None = None
@@ -25,16 +27,26 @@ class WebSection(Section):
     @property
     def is_on_loopback(self) -> bool:
         """Whether only this machine can reach it."""
-        return urlsplit(self.endpoint).hostname in ("127.0.0.1", "::1", "localhost")
+        return _is_loopback(self.endpoint)
+
+    @property
+    def is_in_the_clear(self) -> bool:
+        """Whether passwords cross a network without encryption, to the page or to the proxy before it."""
+        addresses = (self.endpoint, self.public_url or self.endpoint)
+        return any(address.startswith("http:") and not _is_loopback(address) for address in addresses)
 
     @model_validator(mode="after")
     def _encryption(self) -> Self:
         is_https = self.endpoint.startswith("https:")
         if is_https != (self.certificate is not None) or is_https != (self.key is not None):
             raise ValueError("https needs certificate and key, and http has neither")
-        if not (is_https or self.is_on_loopback or self.allow_without_encryption):
+        if self.is_in_the_clear and not self.allow_without_encryption:
             raise ValueError(
                 "passwords would cross the network in the clear: use https with certificate and key, "
                 "or say allow_without_encryption: true"
             )
         return self
+
+
+def _is_loopback(address: str) -> bool:
+    return urlsplit(address).hostname in ("127.0.0.1", "::1", "localhost")

@@ -20,6 +20,7 @@ from impactcell.web.live_feed import LiveFeed
 from impactcell.web.messages import Messages
 from impactcell.web.page_context import STATIC, STATIC_VERSION, PageContext
 from impactcell.web.past import Past
+from impactcell.web.public_address import PublicAddress
 from impactcell.web.requests import (
     CSRF_FIELD,
     RequestRefusedError,
@@ -121,7 +122,8 @@ def page_app(
             Exception: _failed(context),
         },
     )
-    return SecurityHeaders(app)  # around all of it: what says that something failed has them too
+    served = app if settings.public_url is None else PublicAddress(app, settings.public_url)
+    return SecurityHeaders(served)  # around all of it: what says that something failed has them too
 
 
 def _logged_out(context: PageContext) -> Callable[[Request], Awaitable[Response]]:

@@ -94,6 +94,8 @@ class PageSettings:
         Directory for what people drop, and what comes out of it.
     certificate, key : Path or None
         Of the page itself, PEM, for https.
+    public_url : str or None
+        Address in the browser where a proxy is before the page, as in `https://cells.plant.example`.
     """
 
     endpoint: str
@@ -102,11 +104,12 @@ class PageSettings:
     studies: Path
     certificate: Path | None = None
     key: Path | None = None
+    public_url: str | None = None
 
     @property
     def is_encrypted(self) -> bool:
-        """Whether it is reached over TLS."""
-        return urlsplit(self.endpoint).scheme == "https"
+        """Whether browsers reach it over TLS."""
+        return urlsplit(self.public_url or self.endpoint).scheme == "https"
 
 
 class PageBackend(Protocol):

@@ -42,7 +42,10 @@ PAGE_TEXTS: Texts = {
         "Something failed in this page, and it is in the service's log. Cells and OPC UA go on.",
         "Ein Fehler dieser Seite; er steht im Log des Dienstes. Zellen und OPC UA laufen weiter.",
     ),
-    "error_foreign": ("This request came from another page.", "Diese Anfrage kam von einer anderen Seite."),
+    "error_foreign": (
+        "This request came from another page, or by a proxy that web.public_url does not name.",
+        "Diese Anfrage kam von einer anderen Seite, oder über einen Proxy, den web.public_url nicht nennt.",
+    ),
     "error_form": ("This form cannot be read.", "Dieses Formular ist nicht lesbar."),
     "error_form_slow": ("This form came too slowly.", "Dieses Formular kam zu langsam."),
     "error_too_long": ("This form is too long.", "Dieses Formular ist zu lang."),

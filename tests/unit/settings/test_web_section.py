@@ -54,6 +54,18 @@ def test_loopback_needs_no_encryption(tmp_path: Path, endpoint: str) -> None:
         ({"endpoint": "http://127.0.0.1:1/page"}, "scheme, host and port"),
         ({"endpoint": "http://eva:secret@127.0.0.1:1"}, "scheme, host and port"),
         ({"port": 8480}, "port"),
+        ({"public_url": "cells.plant.example"}, "as in https://cells.plant.example"),
+        ({"public_url": "https://"}, "as in https://cells.plant.example"),
+        ({"public_url": "https://eva:secret@cells.plant.example"}, "as in https://cells.plant.example"),
+        ({"public_url": "https://cells.plant.example:0"}, "as in https://cells.plant.example"),
+        ({"public_url": "https://cells.plant.example:99999"}, "as in https://cells.plant.example"),
+        ({"public_url": "https://cells plant.example"}, "as in https://cells.plant.example"),
+        ({"public_url": "https://zellen.wähl.example"}, "as in https://cells.plant.example"),
+        ({"public_url": "https://*.plant.example"}, "as in https://cells.plant.example"),
+        ({"public_url": "ftp://cells.plant.example"}, "as in https://cells.plant.example"),
+        ({"public_url": "https://plant.example/cells"}, "no path"),
+        ({"public_url": "https://plant.example/?a=1"}, "no path"),
+        ({"public_url": "http://cells.plant.example"}, "in the clear"),
     ],
     ids=str,
 )
@@ -74,9 +86,28 @@ def test_a_network_is_open_where_it_is_said(tmp_path: Path, files: tuple[str, st
 
 
 @pytest.mark.parametrize(
+    ("said", "public_url"),
+    [
+        ("https://cells.plant.example", "https://cells.plant.example"),
+        ("HTTPS://Cells.Plant.example:443/", "https://cells.plant.example"),
+        ("https://cells.plant.example:8443", "https://cells.plant.example:8443"),
+        ("http://localhost:80", "http://localhost"),
+        ("https://[FD00::1]:8443", "https://[fd00::1]:8443"),
+    ],
+)
+def test_the_address_in_the_browser_is_as_browsers_write_it(
+    tmp_path: Path, said: str, public_url: str
+) -> None:
+    page = read_cell(write_cell(tmp_path, 1, web={"public_url": said})).settings.web
+    assert page is not None
+    assert page.public_url == public_url
+
+
+@pytest.mark.parametrize(
     ("web", "opcua", "said"),
     [
         ({"allow_without_encryption": True}, {}, "other web settings"),
+        ({"public_url": "https://cells.plant.example"}, {}, "other web settings"),
         (
             {},
             {"users_file": "others.yaml", "endpoint": "opc.tcp://127.0.0.1:4841"},

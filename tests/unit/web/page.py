@@ -153,11 +153,13 @@ def make_page(
     journal: Path | None = None,
     verbs: RunVerb | None = None,
     tour: tuple[TourStop, ...] = (),
+    public_url: str | None = None,
 ) -> Page:
     users = directory / "users.yaml"
     write_users(users, {name: User(name, role, password="x") for role, name in NAMES.items()})
     clock, backend = Clock(), Backend(users)
-    settings = PageSettings(ADDRESS, users, directory / "pki", directory / "studies")
+    studies_dir = directory / "studies"
+    settings = PageSettings(ADDRESS, users, directory / "pki", studies_dir, public_url=public_url)
     feed = LiveFeed([CELL])
     feed.start()
     facts = CellFacts(CELL, "127.0.0.1:502", "opc.tcp://127.0.0.1:4840", journal, tour=tour)
