@@ -117,6 +117,10 @@ class _Cells(Collector):
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
 
+    def __init__(self, host: str, port: int, handler: type[BaseHTTPRequestHandler]) -> None:
+        self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        super().__init__((host, port), handler)
+
     def handle_error(self, request: object, client_address: object) -> None:  # noqa: ARG002 - its signature
         """Stay silent where a scraper has gone; say what else went wrong."""
         error = sys.exception()
@@ -142,9 +146,10 @@ class Monitoring:
             timeout = PATIENCE_S
 
             def do_GET(self) -> None:
-                if self.path == "/metrics":
+                page = self.path.partition("?")[0].rstrip("/")
+                if page == "/metrics":
                     self._answer(200, CONTENT_TYPE_LATEST, generate_latest(registry))
-                elif self.path == "/healthz":
+                elif page == "/healthz":
                     reasons = {cell.cell: cell.reason for cell in health()}
                     content = {
                         name: {"healthy": not reason, "reason": reason} for name, reason in reasons.items()
@@ -154,12 +159,16 @@ class Monitoring:
                 else:
                     self.send_error(404, "only /healthz and /metrics are here")
 
+            def do_HEAD(self) -> None:
+                self.do_GET()
+
             def _answer(self, status: int, content_type: str, body: bytes) -> None:
                 self.send_response(status)
                 self.send_header("Content-Type", content_type)
                 self.send_header("Content-Length", str(len(body)))
                 self.end_headers()
-                self.wfile.write(body)
+                if self.command != "HEAD":
+                    self.wfile.write(body)
 
             def log_message(self, *_: object) -> None:
                 """Stay silent: a scrape every few seconds is no news."""
@@ -168,10 +177,11 @@ class Monitoring:
 
     def __enter__(self) -> Self:
         try:
-            self._server = _Server((self.host, self.port), self._handler)
+            self._server = _Server(self.host, self.port, self._handler)
         except OSError as error:
+            host = f"[{self.host}]" if ":" in self.host else self.host
             raise SettingsError(
-                f"monitoring: cannot listen on {self.host}:{self.port} ({error.strerror}); choose another"
+                f"monitoring: cannot listen on {host}:{self.port} ({error.strerror}); choose another"
             ) from error
         self.port = self._server.server_address[1]
         self._is_ending = False

@@ -8,6 +8,7 @@ import struct
 import urllib.error
 import urllib.request
 from dataclasses import replace
+from http.client import HTTPConnection
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
@@ -68,6 +69,47 @@ def test_one_sick_cell_makes_the_process_unhealthy_and_says_why(broken: dict[str
     with Monitoring("127.0.0.1", 0, lambda: [PRESS, sick]) as http:
         assert get(http.port, "/healthz") == (503, json.dumps(well | ill))
         assert get(http.port, "/")[0] == 404
+
+
+@pytest.mark.parametrize("way", ["{}", "{}/", "{}?", "{}?x=1", "{}/?name[]=impactcell_connected"])
+def test_a_page_is_where_its_path_says_whatever_comes_behind(way: str) -> None:
+    with Monitoring("127.0.0.1", 0, lambda: [PRESS]) as http:
+        for page in ("/healthz", "/metrics"):
+            assert get(http.port, way.format(page)) == get(http.port, page)
+        for elsewhere in ("/health", "/metrics/press-1", "/?/healthz"):
+            assert get(http.port, elsewhere)[0] == 404
+
+
+@pytest.mark.parametrize("page", ["/healthz", "/metrics", "/nothing"])
+def test_a_head_is_that_of_the_page_without_its_body(page: str) -> None:
+    sick = replace(PRESS, link_fault="refused")
+    with Monitoring("127.0.0.1", 0, lambda: [sick]) as http:
+        answers = []
+        for method in ("GET", "HEAD"):
+            connection = HTTPConnection("127.0.0.1", http.port, timeout=PATIENCE_S)
+            connection.request(method, page)
+            answer = connection.getresponse()
+            headers = {name: value for name, value in answer.getheaders() if name != "Date"}
+            answers.append((answer.status, headers, answer.read()))
+            connection.close()
+    (status, headers, body), head = answers
+    assert status == {"/healthz": 503, "/metrics": 200, "/nothing": 404}[page]
+    assert body
+    assert head == (status, headers, b"")
+
+
+def test_an_address_may_be_of_version_6() -> None:
+    try:
+        socket.create_server(("::1", 0), family=socket.AF_INET6).close()
+    except OSError:
+        pytest.skip("this machine has no IPv6")
+    with Monitoring("::1", 0, lambda: [PRESS]) as http:
+        connection = HTTPConnection("::1", http.port, timeout=PATIENCE_S)
+        connection.request("GET", "/healthz")
+        assert connection.getresponse().status == 200
+        connection.close()
+        with pytest.raises(SettingsError, match=rf"cannot listen on \[::1\]:{http.port} "):
+            Monitoring("::1", http.port, list).__enter__()
 
 
 def test_a_port_in_use_is_said() -> None:
