@@ -24,6 +24,7 @@ from impactcell.positioning.lookahead_table import (
     stiffest,
 )
 from impactcell.positioning.model_hypotheses import tap_predictions, with_model_accepted, with_score
+from impactcell.positioning.nominal_plant import nominal_plant
 from impactcell.positioning.planner_posterior import PlannerPosterior
 from impactcell.positioning.posterior_update import update_posterior
 from impactcell.positioning.prediction_watch import score_of
@@ -52,8 +53,9 @@ class TapPlanner:
     overshoot_probability : float
         Bound for a whole task, learning included.
     plant : Plant or mapping, optional
-        Nominal plant, or its fields by name; contact within some 10 % and friction within a factor of 1.4
-        of what the cell turns out to be. Of its effects, resistance that grows with speed is planned with.
+        Nominal plant, or those of its fields by name that differ from `nominal_plant.NOMINAL`; contact within
+        some 10 % and friction within a factor of 1.4 of what the cell turns out to be. Of its effects,
+        resistance that grows with speed is planned with.
     max_force_n : float
         Contact force that no tap may exceed.
     two_sided : bool
@@ -66,7 +68,7 @@ class TapPlanner:
     Raises
     ------
     PositioningError
-        For a limit, tolerance or probability that no cell can have.
+        For a limit, tolerance or probability that no cell can have, or a field that a plant does not have.
     """
 
     tolerance_m: float = 10e-6
@@ -93,11 +95,7 @@ class TapPlanner:
             self.tolerance_m, self.max_velocity_m_s, self.max_stroke_m, self.max_force_n,
             self.overshoot_probability, self.velocity_raster, self.stroke_raster,
         )  # fmt: skip
-        plant = self.plant
-        if plant is None:
-            plant = Plant(stiffness_n_per_m=6.5e5, damping_n_s_per_m=465.0, mu_s=0.25, mu_k=0.19)
-        elif isinstance(plant, Mapping):
-            plant = Plant(**plant)  # type: ignore[arg-type]
+        plant = nominal_plant(self.plant)
         self._gravity = plant.gravity_m_s2
         if not self.travel_m[0] < self.travel_m[1]:
             raise PositioningError(f"tap planner: travel_m must be in order, not {self.travel_m}")

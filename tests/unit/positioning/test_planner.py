@@ -243,6 +243,30 @@ def test_refuses_a_planner_no_cell_can_have() -> None:
         TapPlanner().observe_friction(-0.1, 0.01)
 
 
+@pytest.mark.parametrize(
+    ("given", "mu_s", "mu_k"),
+    [
+        ({"mu_s": 0.22}, 0.22, 0.1672),
+        ({"mu_k": 0.152}, 0.2, 0.152),
+        ({"mu_s": 0.2, "mu_k": 0.1}, 0.2, 0.1),
+        ({"damping_n_s_per_m": 465.0}, 0.25, 0.19),
+    ],
+)
+def test_fields_that_are_not_given_are_those_of_the_nominal_plant(
+    given: dict[str, float], mu_s: float, mu_k: float
+) -> None:
+    some, whole = TapPlanner(plant=given), TapPlanner(plant=Plant(6.5e5, 465.0, mu_s, mu_k))
+    assert some.posterior.mu_k == pytest.approx(mu_k)
+    np.testing.assert_allclose(some.posterior.mean, whole.posterior.mean)
+    np.testing.assert_allclose(some.posterior.cov, whole.posterior.cov)
+
+
+def test_a_field_that_no_plant_has_is_named() -> None:
+    told = "tap planner: plant has no field 'mu'; there are stiffness_n_per_m, "
+    with pytest.raises(PositioningError, match=told):
+        TapPlanner(plant={"mu": 0.2, "mu_s": 0.2})
+
+
 def test_same_history_same_taps() -> None:
     plant = Plant(6.0e5, 500.0, 0.17, 0.76 * 0.17)
     runs = []
