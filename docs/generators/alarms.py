@@ -9,7 +9,7 @@ def rules() -> str:
     rows = []
     for name, rule in RULES.items():
         chosen = rule.settings
-        is_set = "yes" if rule.evaluate is not None else ""
+        is_set = "" if rule.evaluate is None else "off-delay" if rule.is_occurrence else "both"
         rows.append((code(name), str(chosen.severity), str(chosen.on_delay), str(chosen.off_delay), is_set))
     columns = (
         "condition",

@@ -78,8 +78,9 @@ def evaluate(settings: AlarmSettings, state: AlarmSetState, inputs: CycleInputs)
 
     Where its evidence leaves that open, it is as often as the cell wants it of every rule.
     """
+    disabled = frozenset(alarm.name for alarm in state.alarms if not alarm.enabled)
     results = [
-        rule.evaluate(inputs, RuleContext(settings.rule(name), alarm.active, alarm.evidence))
+        rule.evaluate(inputs, RuleContext(settings.rule(name), alarm.active, alarm.evidence, disabled))
         for name, rule, alarm in ((name, rule, state.alarm(name)) for name, rule in RULES.items())
         if rule.evaluate is not None
     ]
@@ -151,15 +152,25 @@ def _suppress(
 
 
 def _explained(state: AlarmSetState, results: tuple[RuleResult, ...]) -> Iterator[RuleResult]:
-    """Give the results; one that another explains neither holds nor is held back any longer."""
-    holding = {result.name for result in results if result.holds}
+    """Give the results; one that another explains neither holds nor is held back any longer.
+
+    What is disabled explains nothing: nobody hears of it, and nothing waits for it.
+    """
+    enabled = {alarm.name for alarm in state.alarms if alarm.enabled}
+    holding = {result.name for result in results if result.holds} & enabled
     active = {alarm.name for alarm in state.alarms if alarm.active}
     for result in results:
         rule = RULES[result.name]
         causes = set(rule.explained_by) & (holding | active) | set(rule.explained_at_once_by) & holding
         if result.hold_back or state.counters[_INDEX[result.name]].held_back is not None:
             causes |= set(rule.may_be_explained_by) & (holding - active)
-        yield RuleResult(result.name, holds=False, is_explained=True) if causes else result
+        others = {*rule.explained_by, *rule.explained_at_once_by, *rule.may_be_explained_by}
+        if causes:
+            yield RuleResult(result.name, holds=False, is_explained=True)
+        elif result.hold_back and not others & enabled:
+            yield replace(result, hold_back=0)
+        else:
+            yield result
 
 
 def apply_rule_result(
@@ -189,7 +200,10 @@ def apply_rule_result(
 
 
 def _retold(alarm: Alarm, result: RuleResult, cycle: int, time_ns: int) -> Transition:
-    """Let an active alarm tell what has changed; where no figure has, its message alone makes it an event."""
+    """Let an active alarm tell what has changed.
+
+    It is an event with this cycle where something has happened anew, or where the message alone is another.
+    """
     message = result.message
     renewed = replace(
         alarm,
@@ -197,7 +211,7 @@ def _retold(alarm: Alarm, result: RuleResult, cycle: int, time_ns: int) -> Trans
         message_de=message.german or alarm.message_de,
         evidence=result.evidence,
     )
-    if has_moved(alarm.evidence, result.evidence):
+    if has_moved(alarm.evidence, result.evidence) and not RULES[result.name].is_occurrence:
         return Transition(renewed)
     return Transition(replace(renewed, cycle=cycle, time_ns=time_ns), (Notification.EVENT,))
 

@@ -162,11 +162,18 @@ class CycleInputs:
 
 @dataclass(frozen=True, slots=True)
 class RuleContext:
-    """Settings of a rule in this cell, whether its alarm is active, and what it has told last."""
+    """Settings of a rule in this cell, whether its alarm is active, and what it has told last.
+
+    Attributes
+    ----------
+    disabled : frozenset of str
+        Conditions, by name, that nobody wants to hear of: they explain nothing.
+    """
 
     settings: RuleSettings
     active: bool
     told: Evidence = NO_EVIDENCE
+    disabled: frozenset[str] = frozenset()
 
     @property
     def threshold(self) -> float:
@@ -204,6 +211,7 @@ class AlarmRule:
         An announced batch change keeps it silent for a while.
     explained_by : tuple of str
         Rules by name: while one of them holds or is active, it has called already, and this one does not.
+        Here and in the next two, one whose condition is disabled calls nobody and explains nothing.
     explained_at_once_by : tuple of str
         Rules by name that explain this one in a cycle in which they hold, not while they merely stay active.
     may_be_explained_by : tuple of str
@@ -213,6 +221,9 @@ class AlarmRule:
     calls_again : bool
         What is told anew while it is active is another occurrence, as the fault of another task: it calls for
         attention, whether or not the one before was acknowledged.
+    is_occurrence : bool
+        It holds in the cycle in which something happens and not in the next: the on-delay of the cell file is
+        not for it, and what happens anew while its alarm is active is an event with its own cycle and time.
     is_probability : bool
         Its statistic and threshold are probabilities, which people read in per cent.
     """
@@ -232,4 +243,5 @@ class AlarmRule:
     may_be_explained_by: tuple[str, ...] = ()
     logged_by_cause: bool = False
     calls_again: bool = False
+    is_occurrence: bool = False
     is_probability: bool = False

@@ -78,7 +78,7 @@ def alarm_settings(cell: CellConfig) -> AlarmSettings:
     rules = {
         name: replace(
             rule.settings,
-            on_delay=rule.settings.on_delay if on is None else on,
+            on_delay=rule.settings.on_delay if on is None or rule.is_occurrence else on,
             off_delay=rule.settings.off_delay if off is None else off,
         )
         for name, rule in RULES.items()

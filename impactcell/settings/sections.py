@@ -118,10 +118,11 @@ class AlarmSection(Section):
     false_alarm_cycles: Annotated[float, Field(ge=100)] = _SIGNATURE.false_alarm_cycles
     """Designed mean number of cycles between two false alarms of one rule."""
     on_delay_cycles: Annotated[int, Field(ge=0)] | None = None
-    """Cycles a rule must hold before its alarm comes: one number for all that cycles decide (WearLimit,
-    WearWarning, BatchShift, DeviantCycle, ModelGap); absent: each one's own."""
+    """Cycles a rule must hold before its alarm comes: one number for WearLimit, WearWarning and ModelGap;
+    absent: each one's own. BatchShift and DeviantCycle hold in one cycle, and come with it."""
     off_delay_cycles: Annotated[int, Field(ge=0)] | None = None
-    """Cycles a rule must be clear before its alarm goes: one number for the same; absent: each one's own."""
+    """Cycles a rule must be clear before its alarm goes: one number for all that cycles decide (WearLimit,
+    WearWarning, BatchShift, DeviantCycle, ModelGap); absent: each one's own."""
 
     @model_validator(mode="after")
     def _hysteresis(self) -> Self:

@@ -1,6 +1,7 @@
 """BatchShift: the material has changed without an announcement.
 
-A shift is detected at one cycle: the alarm stands for a while and then clears by itself.
+A shift is detected at one cycle: the alarm stands for a while and then clears by itself. Another shift in
+that while is another change of the material: it calls again, whether or not the one before was acknowledged.
 """
 
 from impactcell.alarms.rule import (
@@ -25,12 +26,13 @@ HOLD_BACK = 5
 """Cycles for which such a shift waits: from that share on a residual that stays has crossed within three."""
 
 
-def evaluate(inputs: CycleInputs, _context: RuleContext) -> RuleResult:
+def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
     """Say whether the tracker detected a shift of the material at this cycle."""
     shift, gap = inputs.shift, inputs.gap
     if shift is None:
         return RuleResult(NAME, holds=False)
-    if inputs.gap_exceeds and abs(gap.change_cycle - shift.change_cycle) <= HOLD_BACK:
+    is_gap_told = inputs.gap_exceeds and model_gap.NAME not in context.disabled
+    if is_gap_told and abs(gap.change_cycle - shift.change_cycle) <= HOLD_BACK:
         # the estimates moved with what the model does not know, which ModelGap has called
         return RuleResult(NAME, holds=False)
     is_gap_rising = GAP_RISING < gap.statistic / gap.threshold <= 1.0
@@ -70,5 +72,7 @@ RULE = AlarmRule(
     evaluate=evaluate,
     suppressed_by_announcement=True,
     may_be_explained_by=(model_gap.NAME,),
+    calls_again=True,
+    is_occurrence=True,
 )
 """The rule."""

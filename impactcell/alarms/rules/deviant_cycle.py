@@ -1,4 +1,8 @@
-"""DeviantCycle: friction along the stroke of one cycle is unlike that of the others."""
+"""DeviantCycle: friction along the stroke of one cycle is unlike that of the others.
+
+Deviant cycles come in runs, of the same cause: who was called for the first is not called for each, as by a
+chattering alarm (ISA-18.2, IEC 62682). Each is an event of its own, which names the part to be set aside.
+"""
 
 import math
 
@@ -72,5 +76,6 @@ RULE = AlarmRule(
     explained_by=(model_gap.NAME,),
     # the signature begins anew with a shift: what deviates from there on is not of the batch
     explained_at_once_by=(batch_shift.NAME,),
+    is_occurrence=True,
 )
 """The rule."""

@@ -30,13 +30,19 @@ DEPENDS_ON = {
 """What the displacement that is missed depends on, in words."""
 
 
-def evaluate(inputs: CycleInputs, _context: RuleContext) -> RuleResult:
-    """Say whether the residual has left its usual level, or taps miss; nothing while that is learned."""
+def evaluate(inputs: CycleInputs, context: RuleContext) -> RuleResult:
+    """Say whether the residual has left its usual level, or taps miss; nothing while that is learned.
+
+    What taps have raised they also end: a cell may have no residual at all.
+    """
     predictions = inputs.predictions
     if predictions is not None and predictions.lacking and not inputs.gap_exceeds:
         since = max(inputs.cycle - predictions.taps + 1, 1)
         evidence = replace(predictions.evidence, change_cycle=since)
         return RuleResult(NAME, holds=True, message=_message_of_taps(predictions, since), evidence=evidence)
+    is_told_by_taps = context.active and context.told.threshold != inputs.gap.threshold
+    if predictions is not None and is_told_by_taps and inputs.gap_exceeds is None:
+        return RuleResult(NAME, holds=False)
     message = _message(inputs.gap) if inputs.gap_exceeds else NO_MESSAGE
     return RuleResult(NAME, inputs.gap_exceeds, message, inputs.gap)
 

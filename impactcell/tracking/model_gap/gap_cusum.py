@@ -62,7 +62,10 @@ class GapState:
 
 @dataclass(frozen=True, slots=True)
 class GapResult:
-    """Outcome of one capture; `exceeds` None while the usual residual is being learned."""
+    """Outcome of one capture; `exceeds` None while the usual residual is being learned, or there is none.
+
+    Then the evidence has the threshold alone.
+    """
 
     state: GapState
     exceeds: bool | None
@@ -82,7 +85,7 @@ def update(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
     """
     limit = threshold(false_alarm_cycles)
     if not (math.isfinite(gap) and gap > 0.0):
-        return GapResult(state, None, Evidence(), "the capture has no normalised residual")
+        return GapResult(state, None, Evidence(threshold=limit), "the capture has no normalised residual")
     value = math.log(gap)
     score = _score(state, value)
     variogram = scatter_correlation.update(state.variogram, score, 1.0)
@@ -97,7 +100,7 @@ def update(state: GapState, gap: float, cycle: int, false_alarm_cycles: float, p
         squared_deviations += step * (value - mean)
     updated = GapState(count, mean, squared_deviations, excess, since, variogram)
     if count < FIRST:
-        return GapResult(updated, None, Evidence(), "the usual residual is being learned")
+        return GapResult(updated, None, Evidence(threshold=limit), "the usual residual is being learned")
     usual = math.exp(mean)
     evidence = Evidence(
         excess,
