@@ -33,7 +33,13 @@ from asyncua.crypto.security_policies import (
 from asyncua.crypto.uacrypto import verify_pss_sha256, verify_sha256
 from asyncua.server.address_space import AddressSpace, AttributeValue, NodeData
 from asyncua.ua import ua_binary
-from asyncua.ua.ua_binary import nodeid_from_binary, struct_from_binary, struct_to_binary, uatcp_to_binary
+from asyncua.ua.ua_binary import (
+    nodeid_from_binary,
+    struct_from_binary,
+    struct_to_binary,
+    uatcp_to_binary,
+    variant_to_binary,
+)
 from asyncua.ua.uaprotocol_auto import DataChangeFilter as DecodedDataChangeFilter
 from asyncua.ua.uatypes import datetime_to_win_epoch
 from cryptography import exceptions
@@ -66,6 +72,7 @@ __all__ = [
     "struct_from_binary",
     "struct_to_binary",
     "uatcp_to_binary",
+    "variant_to_binary",
 ]
 
 SECURITY_POLICIES: Final = {

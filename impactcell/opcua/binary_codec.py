@@ -12,6 +12,7 @@ from impactcell.opcua.asyncua_adapter import (
     nodeid_from_binary,
     struct_from_binary,
     struct_to_binary,
+    variant_to_binary,
 )
 from impactcell.opcua.loop_share import LoopShare
 
@@ -30,6 +31,8 @@ NOT_DECODED: Final = (
     MemoryError,
 )
 """What asyncua raises at bytes that are no message."""
+NOT_ENCODED: Final = (ua.UaError, ValueError, TypeError, OverflowError)
+"""What it raises at a value that its type does not hold: a number out of range, half a character."""
 
 
 class StatusCodeError(Exception):
@@ -118,6 +121,15 @@ def encode(value: object) -> bytes:
     """Encode a structure."""
     data: bytes = struct_to_binary(value)
     return data
+
+
+def encoding_fault(value: ua.Variant) -> str:
+    """Say why a value cannot be sent; empty where it can."""
+    try:
+        variant_to_binary(value)
+    except NOT_ENCODED as error:
+        return str(error)
+    return ""
 
 
 def service_fault(handle: int, code: int) -> bytes:

@@ -1,5 +1,6 @@
 """Values of variables as they are now, and who is told when they change."""
 
+import logging
 from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import Final
@@ -7,9 +8,13 @@ from typing import Final
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace, AttributeValue, struct_to_binary
+from impactcell.opcua.binary_codec import encoding_fault
 from impactcell.opcua.fan_out import FanOut
 
 GOOD: Final = ua.StatusCode(ua.StatusCodes.Good)
+NOT_ENCODABLE: Final = ua.StatusCode(ua.StatusCodes.BadEncodingError)
+"""Of a variable whose value cannot be sent."""
+_log = logging.getLogger(__name__)
 
 
 def moment(time_ns: int) -> datetime:
@@ -61,11 +66,16 @@ ValueObserver = Callable[[SharedValue], None]
 
 
 class StoredVariable:
-    """A variable that is written often: its place in the address space need not be looked up each time."""
+    """A variable that is written often: its place in the address space need not be looked up each time.
 
-    __slots__ = ("_attribute", "_fan_out", "observers")
+    A value that cannot be sent gets no farther than here: it would take others along, of the same message or
+    request. The variable keeps the one before and is Bad, which the log tells once.
+    """
 
-    def __init__(self, attribute: AttributeValue, fan_out: FanOut) -> None:
+    __slots__ = ("_attribute", "_fan_out", "_node", "observers")
+
+    def __init__(self, node: ua.NodeId, attribute: AttributeValue, fan_out: FanOut) -> None:
+        self._node = node
         self._attribute = attribute
         self._fan_out = fan_out
         self.observers: dict[ValueObserver, None] = {}
@@ -77,9 +87,18 @@ class StoredVariable:
 
     def write(self, data: ua.DataValue) -> None:
         """Replace the value and tell all who watch it."""
+        if data.Value is not None and (fault := encoding_fault(data.Value)):
+            data = self._not_encodable(data, fault)
         self._attribute.value = data
         if self.observers:
             self._fan_out.deliver(self.observers, SharedValue(data))
+
+    def _not_encodable(self, data: ua.DataValue, fault: str) -> ua.DataValue:
+        before = self.data
+        if before.StatusCode != NOT_ENCODABLE:
+            name = self._node.Identifier
+            _log.error("%s: %s; the node is Bad until it has a value that can be sent", name, fault)
+        return ua.DataValue(before.Value, NOT_ENCODABLE, data.SourceTimestamp, data.ServerTimestamp)
 
     def set_status(self, status: ua.StatusCode, time: datetime) -> None:
         """Replace the status and keep the last value; do nothing where the status is the same."""
@@ -104,8 +123,8 @@ class VariableStore:
         """Find a variable."""
         stored = self._variables.get(node)
         if stored is None:
-            stored = StoredVariable(self._space[node].attributes[ua.AttributeIds.Value], self._fan_out)
-            self._variables[node] = stored
+            attribute = self._space[node].attributes[ua.AttributeIds.Value]
+            stored = self._variables[node] = StoredVariable(node, attribute, self._fan_out)
         return stored
 
     def write(self, node: ua.NodeId, data: ua.DataValue) -> None:

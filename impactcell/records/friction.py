@@ -107,7 +107,14 @@ class WearState:
 
 @dataclass(frozen=True, slots=True)
 class BatchState:
-    """Offset of the present batch from the reference batch, and the last shift found."""
+    """Offset of the present batch from the reference batch, and the last shift found.
+
+    Attributes
+    ----------
+    last_shift_cycle : int
+        Its first cycle as the module counted then, whether or not it has counted anew since; 0 before the
+        first shift.
+    """
 
     batch_id: str
     offset: float

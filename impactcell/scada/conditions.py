@@ -4,6 +4,7 @@ What an alarm may do next is decided in `impactcell.alarms`; here its state is o
 """
 
 import hashlib
+import logging
 import time
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
@@ -12,9 +13,10 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.alarms import RULES, is_retained
+from impactcell.opcua.binary_codec import encoding_fault
 from impactcell.opcua.event_notification import BrowsePath, EventNotification
 from impactcell.opcua.languages import TranslatedText
-from impactcell.opcua.variable_store import GOOD, VariableStore, moment
+from impactcell.opcua.variable_store import GOOD, NOT_ENCODABLE, VariableStore, moment
 from impactcell.records import Alarm, Shelving
 from impactcell.scada.alarm_events import activation_id, event_id
 from impactcell.scada.cell_nodes import CellSpace
@@ -44,6 +46,7 @@ _TOLD_WHEN_DISABLED: Final = frozenset(
     }
 )
 _DISABLED: Final = ua.StatusCode(ua.StatusCodes.BadConditionDisabled)
+_log = logging.getLogger(__name__)
 
 
 def unshelve_ms(alarm: Alarm) -> float:
@@ -112,11 +115,18 @@ class Condition:
         return self._event(self.alarm, self._last_severity, self._time)
 
     def _event(self, alarm: Alarm, last_severity: int, time: datetime | None = None) -> EventNotification:
-        fields = dict(self._fields(alarm, last_severity, time))
+        fields = {path: self._sendable(path, v) for path, v in self._fields(alarm, last_severity, time)}
         if not alarm.enabled:
             bad = ua.Variant(_DISABLED, ua.VariantType.StatusCode)
             fields = {p: v if not p or p[0] in _TOLD_WHEN_DISABLED else bad for p, v in fields.items()}
         return EventNotification(self._event_type, fields, self._notifiers)
+
+    def _sendable(self, path: BrowsePath, value: ua.Variant) -> ua.Variant:
+        """Give a field of an event, and in place of one that cannot be sent its status: the event is told."""
+        if not (fault := encoding_fault(value)):
+            return value
+        _log.error("%s: %s/%s: %s; its events are without it", self.cell, self.name, "/".join(path), fault)
+        return ua.Variant(NOT_ENCODABLE, ua.VariantType.StatusCode)
 
     def _write_nodes(self) -> None:
         alarm, now = self.alarm, datetime.now(UTC)

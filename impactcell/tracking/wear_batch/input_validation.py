@@ -11,6 +11,8 @@ PERIOD_GAIN = 0.05
 """Share of each new period in the mean one."""
 LONGEST_PERIOD = 2.0
 """A period counts at most as so many of the usual one: a pause is not a slower rate."""
+KEPT_NUMBERINGS = 16
+"""Starts of the module over which it is remembered how it counted before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +33,9 @@ class CycleClock:
         Present time between cycles; nan while unknown.
     session : int
         That of the newest cycle: changes when the module has restarted and counts anew; 0 while unknown.
+    earlier : tuple of (int, int)
+        Of each time that the module has counted anew, oldest first: the index from which on it did, and the
+        base until then.
     """
 
     base: int = 0
@@ -39,10 +44,15 @@ class CycleClock:
     time_ns: int = 0
     period_s: float = math.nan
     session: int = 0
+    earlier: tuple[tuple[int, int], ...] = ()
 
     def number(self, index: int) -> int:
-        """Cycle number as the module counts."""
-        return index - self.base
+        """Give the number that the module gave to a cycle, however often it has counted anew since.
+
+        0 where it is not known any more how it counted then.
+        """
+        bases = (base for until, base in self.earlier if index < until)
+        return max(index - next(bases, self.base), 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,8 +100,11 @@ def update_clock(
     time_ns, period_s, note = _update_period(clock, time_ns, passed)
     if has_restarted:
         note = "; ".join(filter(None, (f"cycle numbers restarted at {cycle}", note)))
+    earlier = clock.earlier
+    if base != clock.base:
+        earlier = (*earlier, (index, clock.base))[-KEPT_NUMBERINGS:]
     timing = CycleTiming(index, passed, 0, repeated=False, note=note)
-    return CycleClock(base, index, (*seen, index), time_ns, period_s, session), timing
+    return CycleClock(base, index, (*seen, index), time_ns, period_s, session, earlier), timing
 
 
 def validate_estimate(value: float, std: float) -> tuple[str, bool]:

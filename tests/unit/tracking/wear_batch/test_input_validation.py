@@ -62,6 +62,34 @@ def test_a_module_that_restarts_counts_anew_from_its_first_cycle_on():
     assert update_clock(clock, 59, 0, LIMIT, 8)[1].repeated
 
 
+def test_a_cycle_keeps_the_number_that_the_module_gave_it_however_often_that_starts():
+    clock, given = CycleClock(), {}
+    for session in range(1, 12):
+        for cycle in range(1 if session % 2 else 0, 5 + session):
+            clock, timing = update_clock(clock, cycle, 0, LIMIT, session)
+            given[timing.index] = cycle
+    assert {index: clock.number(index) for index in given} == given
+
+
+def test_what_is_not_known_any_more_of_a_cycle_s_number_is_0():
+    """A number below 0 cannot be sent: no value of its message was, and nobody could read its node."""
+    clock = CycleClock()
+    for session in range(1, 40):
+        for cycle in range(1, 4):
+            clock, _ = update_clock(clock, cycle, 0, LIMIT, session)
+    assert (clock.number(1), clock.number(clock.last)) == (0, 3)
+    assert len(clock.earlier) < 39
+    # a state of an earlier version knows of its last numbering only
+    assert replace(clock, earlier=()).number(clock.base - 30) == 0
+
+
+def test_a_module_that_counts_on_after_its_start_has_one_numbering():
+    clock = CycleClock()
+    for cycle in range(1, 40):
+        clock, _ = update_clock(clock, cycle, 0, LIMIT, 1 + cycle // 10)
+    assert (clock.base, clock.earlier) == (0, ())
+
+
 def test_a_session_that_was_not_known_before_is_no_restart():
     clock, _ = come([10, 11])
     clock, timing = update_clock(clock, 11, 0, LIMIT, 5)

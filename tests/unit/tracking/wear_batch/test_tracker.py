@@ -167,6 +167,25 @@ def test_cycle_numbers_may_restart():
     assert outcomes[-1].wear.rate_per_cycle == plain[-1].wear.rate_per_cycle
 
 
+@pytest.mark.parametrize("starts_at", [249, 251, 255, 300], ids=["before", "within", "at once", "later"])
+def test_a_shift_keeps_its_cycle_number_when_the_module_starts_anew(starts_at):
+    """It was -50 and less, which OPC UA cannot send; and another number is another shift to who positions."""
+    readings = [
+        replace(r, cycle=r.cycle - starts_at + 1, session=8)
+        if r.cycle >= starts_at
+        else replace(r, session=7)
+        for r in series(330, step=4.0, at=250)
+    ]
+    outcomes = run(UNKNOWN, readings)
+    (told,) = [o.shift.change_cycle for o in outcomes if o.shift]
+    number = 250 if starts_at > 250 else 250 - starts_at + 1
+    assert abs(told - number) <= 2
+    since = [o.batch.last_shift_cycle for o in outcomes[270:]]
+    assert all(abs(cycle - number) <= 2 for cycle in since)
+    assert len(set(since[29:])) == 1
+    assert outcomes[240].batch.last_shift_cycle == 0
+
+
 @pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
 def test_missing_cycles_count_as_wear(config):
     readings = [r for r in series(800, slope=2e-5, batch="A") if r.cycle % 3 == 0]
