@@ -176,17 +176,32 @@ def identify_random_walks(
 
 
 def replay_filter(
-    settings: TrackerSettings, record: CommissioningRecord, noise: NoiseScale, walks: RandomWalks
+    settings: TrackerSettings,
+    record: CommissioningRecord,
+    noise: NoiseScale,
+    walks: RandomWalks,
+    present: wear_filter.WearFilter,
 ) -> wear_filter.WearFilter:
-    """Run the filter of known batches over the record."""
-    rows = record.rows[record.rows[:, BATCH] >= 0.0]
+    """Run the filter of known batches over the record, from where `present`, which is in use, was begun.
+
+    That stays where no cycle of the record was named.
+    """
+    is_named = record.rows[:, BATCH] >= 0.0
+    if not is_named.any():
+        return present
+    rows = record.rows[is_named]
     variances = noise_scale.variances(noise, rows[:, STD])
     unit = float(np.median(variances))
     names = [record.batches[int(place)] for place in rows[:, BATCH]]
+    unnamed = int(np.argmax(is_named))
     is_first = (rows[:, INDEX] < rows[0, INDEX] + EARLIEST_CHANGE) & (rows[:, BATCH] == rows[0, BATCH])
-    begun = len(rows) if is_first.all() else int(np.argmin(is_first))
-    first = replay_bank(settings, replace(record, rows=rows[:begun]), noise, walks, int(rows[0, INDEX]))
-    state = wear_filter.from_bank(*run_length_bank.moments(first.bank), names[0])
+    begun = 1 if unnamed else len(rows) if is_first.all() else int(np.argmin(is_first))
+    # cycles before the first that was named are the bank's, and say of wear what that makes of them
+    first = record.rows[: unnamed + 1] if unnamed else rows[:begun]
+    replayed = replay_bank(settings, replace(record, rows=first), noise, walks, int(first[0, INDEX]))
+    moments = run_length_bank.moments(replayed.bank)
+    is_beside = present.batches[0] is None
+    state = (wear_filter.beside_reference if is_beside else wear_filter.from_bank)(*moments, names[0])
     followed = zip(rows[begun - 1 :], rows[begun:], variances[begun:], names[begun:], strict=False)
     for before, row, variance, name in followed:
         passed = int(row[INDEX] - before[INDEX])

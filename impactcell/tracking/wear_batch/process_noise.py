@@ -15,7 +15,7 @@ from impactcell.tracking.wear_batch import (
 )
 from impactcell.tracking.wear_batch.batch_filter import BankUpdate
 from impactcell.tracking.wear_batch.noise_identification import CommissioningRecord
-from impactcell.tracking.wear_batch.settings import TrackerSettings
+from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.wear_batch.state import TrackerState, UsableCycle
 
 
@@ -26,7 +26,8 @@ def commission(
     commissioning: CommissioningRecord,
 ) -> TrackerState:
     """Commission the process noise from the first cycles."""
-    record = noise_identification.append_cycle(commissioning, cycle, cycle.observation.batch_id)
+    batch = cycle.observation.batch_id if settings.batch is BatchKnowledge.KNOWN else None
+    record = noise_identification.append_cycle(commissioning, cycle, batch)
     cycles = len(record.rows)
     due = cycles - settings.commissioning_delay
     is_ended = due >= settings.commissioning_cycles
@@ -104,7 +105,7 @@ def _replayed(
     again = noise_identification.replay_bank(settings, record, state.noise, walks, state.accepted)
     known = state.filter
     if known is not None:
-        known = noise_identification.replay_filter(settings, record, state.noise, walks)
+        known = noise_identification.replay_filter(settings, record, state.noise, walks, known)
     return replace(
         state,
         bank=again.bank,

@@ -7,6 +7,7 @@ from impactcell.tracking.wear_batch import (
     batch_change_detection,
     batch_filter,
     input_validation,
+    known_batches,
     noise_identification,
     noise_scale,
     process_noise,
@@ -15,21 +16,18 @@ from impactcell.tracking.wear_batch import (
     wear_blocks,
     wear_filter,
 )
-from impactcell.tracking.wear_batch.batch_filter import BankUpdate
 from impactcell.tracking.wear_batch.input_validation import CycleTiming
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.wear_batch.state import (
     ANNOUNCED,
     RULED_OUT,
     UNSAID,
-    ChangePoint,
     FrictionObservation,
     TrackerState,
     TrackingResult,
     UsableCycle,
 )
 from impactcell.tracking.wear_batch.state_reports import CycleOutcome, empty_result, tracking_result
-from impactcell.tracking.wear_batch.wear_filter import WearFilter
 
 SHORTEST_BATCH = 4.0
 """Mean cycles a batch id must last to say anything about batches."""
@@ -97,12 +95,12 @@ def update(
     updated = batch_filter.update_bank(settings, state, cycle)
     if state.commissioning is None and timing.lag == 0:
         state, cycle, updated, raised = process_noise.compare_models(settings, state, cycle, updated)
-        state = _with_past_seen_anew(state, updated) if raised else state
+        state = known_batches.with_past_seen_anew(state, updated) if raised else state
         notes.extend(raised)
     state, updated, raised = rate_change_detection.detect_rate_change(settings, state, cycle, updated, clock)
     notes.extend(raised)
     before, found = batch_change_detection.detect_change(settings, state, cycle, updated)
-    state, known, change, innovation = _update_filter(settings, before, cycle, updated, found)
+    state, known, change, innovation = known_batches.update_filter(settings, before, cycle, updated, found)
     state = replace(
         state,
         clock=clock,
@@ -200,89 +198,3 @@ def _follow_batch_id(
     )
     is_believed = settings.batch is BatchKnowledge.KNOWN or is_expected
     return state, ANNOUNCED if is_believed else UNSAID
-
-
-def _update_filter(
-    settings: TrackerSettings,
-    state: TrackerState,
-    cycle: UsableCycle,
-    updated: BankUpdate,
-    change: ChangePoint | None,
-) -> tuple[TrackerState, WearFilter | None, ChangePoint | None, float]:
-    """Take a cycle, in the bank by now, into the filter where the batch is known; also its innovation."""
-    batch_id, current, timing = cycle.observation.batch_id, state.filter, cycle.timing
-    is_in_bank_only = timing.lag > 0 and current is not None and batch_id not in current.batches
-    is_known = settings.batch is BatchKnowledge.KNOWN and batch_id is not None
-    if is_known and _is_announced_under_same_id(cycle, current):
-        # what is measured has changed, as by another model: the bank was told, and has the offset right
-        change, has_changed = None, True
-    else:
-        has_changed = change is not None
-    is_bent = state.rate_change is not None and state.rate_change.detected_at == timing.index
-    if is_known and current is not None and not (has_changed or is_bent or is_in_bank_only):
-        if _is_one_of_first(state, cycle, current):
-            first = wear_filter.from_bank(*run_length_bank.moments(updated.bank), current.current)
-            return state, first, change, batch_filter.innovation(state, cycle)
-        return _update_known_batch(settings, state, cycle, current)
-    innovation = batch_filter.innovation(state, cycle)
-    if settings.batch is BatchKnowledge.UNKNOWN:
-        return state, current, change, innovation
-    if batch_id is None:
-        if current is not None and timing.lag == 0:
-            # nobody says of which batch the cycle was: its time passes; after a change the bank knows better
-            current = None if is_bent or change is not None else _pass_time(state, current, cycle)
-    elif current is None:
-        current = wear_filter.from_bank(*run_length_bank.moments(updated.bank), batch_id)
-    elif has_changed:
-        current = wear_filter.restart_after_change(current, *run_length_bank.moments(updated.bank))
-        # what was learned of the noise from here on would be learned from a mix of two materials
-        state = replace(state, tested=True, commissioning=None)
-    elif is_bent:
-        current = wear_filter.restart_at_rate(current, *run_length_bank.moments(updated.bank))
-    return state, current, change, innovation
-
-
-def _with_past_seen_anew(state: TrackerState, updated: BankUpdate) -> TrackerState:
-    """Let the filter follow a bank that sees all cycles anew: a change that was found in them may be none.
-
-    Only while one batch id has been seen: the bank knows nothing of how others compare.
-    """
-    if state.filter is None or not state.tested or state.batch_count > 1:
-        return state
-    again = wear_filter.restart_after_change(state.filter, *run_length_bank.moments(updated.bank))
-    return replace(state, filter=again)
-
-
-def _is_one_of_first(state: TrackerState, cycle: UsableCycle, current: WearFilter) -> bool:
-    """Whether the filter is still what the bank says: all cycles yet are of one batch, and few."""
-    is_young = cycle.timing.index < state.first_index + noise_identification.EARLIEST_CHANGE
-    return is_young and current.batches == (cycle.observation.batch_id,)
-
-
-def _is_announced_under_same_id(cycle: UsableCycle, current: WearFilter | None) -> bool:
-    observation = cycle.observation
-    is_same_id = current is not None and observation.batch_id == current.current
-    return observation.expected_change and is_same_id and cycle.timing.lag == 0
-
-
-def _update_known_batch(
-    settings: TrackerSettings, state: TrackerState, cycle: UsableCycle, current: WearFilter
-) -> tuple[TrackerState, WearFilter, ChangePoint | None, float]:
-    """Take a cycle of a known batch into the filter, and test the batch against the one before."""
-    lag, variance, batch_id = cycle.timing.lag, cycle.variance, cycle.observation.batch_id
-    if lag == 0:
-        current = _pass_time(state, current, cycle)
-        if batch_id is not None and batch_id != current.current:
-            has_been_seen = batch_id in current.batches
-            current = wear_filter.switch_batch(current, batch_id, settings.step_std**2 * variance)
-            if has_been_seen and batch_change_detection.differed_before(settings, state, current, cycle):
-                state = replace(state, tested=True)
-    current, error = wear_filter.update(
-        current, cycle.observation.mu_s, variance, settings.outlier_threshold, lag, batch_id
-    )
-    state, change = batch_change_detection.compare_with_previous_batch(settings, state, current, cycle)
-    return state, current, change, error.value / error.std
-
-
-def _pass_time(state: TrackerState, current: WearFilter, cycle: UsableCycle) -> WearFilter:
-    return wear_filter.predict(current, cycle.timing.passed, state.level_variance, state.slope_variance)

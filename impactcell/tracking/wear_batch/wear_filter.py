@@ -31,8 +31,8 @@ class WearFilter:
     Attributes
     ----------
     batches : tuple of str
-        The reference batch (None once its material has changed under the same name), then those with an
-        offset in the state, least recently seen first.
+        The reference batch (None where it had no name, or its material has changed under the same one), then
+        those with an offset in the state, least recently seen first.
     current : str
         The present batch.
     mean : ndarray, shape (2 + len(batches) - 1,)
@@ -64,16 +64,25 @@ def from_bank(mean: Samples, covariance: Samples, batch: str) -> WearFilter:
     return WearFilter((batch,), batch, mean[:2].copy(), covariance[:2, :2].copy())
 
 
+def beside_reference(
+    mean: Samples, covariance: Samples, batch: str, reference: str | None = None
+) -> WearFilter:
+    """Go on from the bank's state [total, slope, offset, shift] with a batch that is not the reference.
+
+    Level = total - offset, slope and the batch's offset are the bank's; the reference may have no name.
+    """
+    taken = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
+    return WearFilter((reference, batch), batch, taken @ mean, taken @ covariance @ taken.T)
+
+
 def restart_after_change(state: WearFilter, mean: Samples, covariance: Samples) -> WearFilter:
     """Go on from the bank's state after the present batch changed without a new name.
 
-    What the filter took in since the change is wrong, and the bank has it right: level = total - offset,
-    slope and the present batch's offset are taken from it. Offsets of batches before are given up.
+    What the filter took in since the change is wrong, and the bank has it right. Offsets of batches before
+    are given up.
     """
-    taken = np.array([[1.0, 0.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
     reference = None if state.current == state.batches[0] else state.batches[0]
-    batches = (reference, state.current)
-    return WearFilter(batches, state.current, taken @ mean, taken @ covariance @ taken.T)
+    return beside_reference(mean, covariance, state.current, reference)
 
 
 def restart_at_rate(state: WearFilter, mean: Samples, covariance: Samples) -> WearFilter:
