@@ -172,19 +172,18 @@ def step(
     """Take one cycle through the whole pipeline; `faults` is what the fieldbus found wrong with it."""
     capture = fill_defaults(design.defaults, capture)
     features = extract(capture)
-    named = assign_batch(state.batch, capture, announcement)
+    named = assign_batch(_of_session(state, capture), capture, announcement)
+    is_expected = named.expected or state.model_changed
     friction = degrade_quality(estimate_from_features(features, design.model), faults)
     period_s = update_period(state.period_s, (state.cycle, state.time_ns), capture)
     tracked = wear_batch.update(
         design.tracker,
         state.tracker,
-        FrictionObservation.of(
-            capture, friction, named.batch_id, expected=named.expected or state.model_changed
-        ),
+        FrictionObservation.of(capture, friction, named.batch_id, expected=is_expected),
     )
     conditions = CycleConditions(
         batch_id=tracked.batch.batch_id,
-        restart=tracked.shift is not None or state.model_changed,
+        restart=tracked.shift is not None or is_expected or tracked.expected,
         acceleration=free_motion.model_acceleration(design.model.plant, capture),
         gravity_m_s2=design.model.plant.gravity_m_s2,
         period_s=period_s,
@@ -276,6 +275,13 @@ def start_batch(state: CellState, batch_id: str, *, expected: bool) -> CellState
 def reset_wear_level(state: CellState) -> CellState:
     """Learn the wear level anew from the next cycle on, after worn parts were replaced."""
     return replace(state, tracker=wear_batch.reset_wear_level(state.tracker))
+
+
+def _of_session(state: CellState, capture: Capture) -> BatchNaming:
+    """Give what has been said of the batch, without what was announced before the module started anew."""
+    before = state.tracker.clock.session
+    has_started = before != capture.session and 0 not in (before, capture.session)
+    return replace(state.batch, last_announcement=0) if has_started else state.batch
 
 
 def _gap_quality(friction: FrictionEstimate, gapped: gap_cusum.GapResult) -> Quality:

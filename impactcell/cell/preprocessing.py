@@ -122,7 +122,8 @@ def assign_batch(naming: BatchNaming, capture: Capture, announcement: BatchAnnou
 
     The batch is what the module wrote down with the cycle itself. Only the newest announcement can be read.
     If several came during an outage, its sequence tells how many were missed: so many changes of the module's
-    batch before `from_cycle` of the newest count as announced.
+    batch before `from_cycle` of the newest count as announced. Where the module shows none, what it showed
+    before it started anew is forgotten: the next may have any number.
     """
     by_operator, batch_id, expected = naming.by_operator, capture.batch_id, False
     if by_operator is not None and by_operator.module_batch_id == capture.batch_id:
@@ -130,7 +131,7 @@ def assign_batch(naming: BatchNaming, capture: Capture, announcement: BatchAnnou
         by_operator = replace(by_operator, expected=False)
     else:
         by_operator = None
-    last_sequence = naming.last_announcement
+    last_sequence = 0 if announcement is None else naming.last_announcement
     if announcement is not None and announcement.sequence != last_sequence:
         changed = naming.by_module is not None and capture.batch_id not in (None, naming.by_module)
         if capture.cycle >= announcement.from_cycle:

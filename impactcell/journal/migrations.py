@@ -278,6 +278,7 @@ STATE_MIGRATIONS: Final = (
         added={
             "handled_target": None,
             "cell.tracker.clock.earlier": [],
+            "cell.tracker.expects_change": False,
         }
     ),
 )

@@ -103,7 +103,7 @@ class CycleConditions:
     batch_id : str
         Material; another one restarts the reference.
     restart : bool
-        The tracker found a batch shift: restart the reference.
+        The tracker found a batch shift, or a change is expected: restart the reference.
     acceleration : callable, optional
         What the model knows to depend on the speed, see `friction_profile.information`.
     gravity_m_s2 : float

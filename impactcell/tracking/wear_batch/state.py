@@ -169,6 +169,8 @@ class TrackerState:
         What all cycles say of wear where nobody says of which batch they are; None while the filter does.
     common_variance, common_cycles : float
         Of what the estimates of the reference batch share, the mean, and the cycles that it is of.
+    expects_change : bool
+        Somebody said that what estimates are of changes, and no cycle since could be used in its order.
     """
 
     clock: CycleClock = field(default_factory=CycleClock)
@@ -195,6 +197,7 @@ class TrackerState:
     wear_blocks: WearBlocks | None = None
     common_variance: float = math.nan
     common_cycles: float = 0.0
+    expects_change: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

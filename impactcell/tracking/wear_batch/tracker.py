@@ -43,8 +43,11 @@ def update(
     """Take one cycle into the state.
 
     An estimate that cannot be used leaves wear and batch as they were, says why, and the next good one
-    is used. Cycle numbers may be missing, late, repeated or restart; the clock may go back.
+    is used. Cycle numbers may be missing, late, repeated or restart; the clock may go back. A change that
+    somebody said comes with one that cannot be used, or late, is expected with the next that is in order.
     """
+    if state.expects_change:
+        observation = replace(observation, expected_change=True)
     clock, timing = input_validation.update_clock(
         state.clock,
         observation.cycle,
@@ -70,9 +73,8 @@ def update(
     if is_unusable or timing.repeated:
         # the clock must not pass a cycle that was not taken in: its time passes with the next one
         clock = replace(clock, last=state.clock.last) if state.clock.seen else state.clock
-        return _report(
-            settings, replace(state, clock=clock, noise=noise), observation, CycleOutcome(notes, used=False)
-        )
+        state = replace(state, clock=clock, noise=noise, expects_change=observation.expected_change)
+        return _report(settings, state, observation, CycleOutcome(notes, used=False))
     noise, std = noise_scale.update(
         noise,
         observation.mu_s,
@@ -81,9 +83,11 @@ def update(
         other_batch=_is_other_batch(settings, state, observation),
     )
     variance = noise_scale.variance(noise, std)
+    expects_change = observation.expected_change and timing.lag > 0
     if len(state.bank) == 0:
         cycle = UsableCycle(observation, timing, noise, std, variance, RULED_OUT)
-        first = _first_state(settings, replace(state, clock=clock, noise=noise), cycle)
+        state = replace(state, clock=clock, noise=noise, expects_change=expects_change)
+        first = _first_state(settings, state, cycle)
         return _report(settings, first, observation, CycleOutcome(notes, used=True))
     state, announced = _follow_batch_id(settings, state, observation, timing)
     if (
@@ -111,6 +115,7 @@ def update(
         outliers=updated.outliers,
         change_point=batch_change_detection.refined_change_point(state, updated.bank),
         wear_blocks=batch_filter.update_blocks(settings, state, cycle, updated),
+        expects_change=expects_change,
     )
     state = _follow_common_error(state, cycle)
     if state.commissioning is not None and timing.lag == 0:
