@@ -273,8 +273,12 @@ def start_batch(state: CellState, batch_id: str, *, expected: bool) -> CellState
 
 
 def reset_wear_level(state: CellState) -> CellState:
-    """Learn the wear level anew from the next cycle on, after worn parts were replaced."""
-    return replace(state, tracker=wear_batch.reset_wear_level(state.tracker))
+    """Learn wear level and usual friction along the stroke anew, after worn parts were replaced.
+
+    How cycles vary about what is usual is kept.
+    """
+    tracker = wear_batch.reset_wear_level(state.tracker)
+    return replace(state, tracker=tracker, signature=signature.restart(state.signature))
 
 
 def _of_session(state: CellState, capture: Capture) -> BatchNaming:

@@ -152,12 +152,17 @@ def update(
     )
 
 
+def restart(state: SignatureState) -> SignatureState:
+    """Learn the mean anew from the next cycle on; how cycles vary is kept."""
+    return replace(state, reference=references.restart(state.reference), deviant_run=0)
+
+
 def _of_material(state: SignatureState, conditions: CycleConditions) -> SignatureState:
     """Restart the reference where the material is another one, and keep its name."""
     batch_id = conditions.batch_id
     is_other = bool(batch_id and state.batch_id and batch_id != state.batch_id)
     if conditions.restart or is_other:
-        state = replace(state, reference=references.restart(state.reference), deviant_run=0)
+        state = restart(state)
     return replace(state, batch_id=batch_id) if batch_id and batch_id != state.batch_id else state
 
 

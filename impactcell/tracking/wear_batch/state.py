@@ -239,7 +239,10 @@ def initial_state() -> TrackerState:
 
 
 def reset_wear_level(state: TrackerState) -> TrackerState:
-    """State after the surface was renewed: the next cycle is a new reference; the noise stays learned."""
+    """State after the surface was renewed: the next cycle is a new reference.
+
+    The noise stays learned, and so do random walks of level and slope where there are any.
+    """
     return TrackerState(
         clock=state.clock,
         noise=state.noise,

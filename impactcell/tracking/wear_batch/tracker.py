@@ -134,10 +134,21 @@ def _report(
 
 
 def _first_state(settings: TrackerSettings, state: TrackerState, cycle: UsableCycle) -> TrackerState:
-    """Begin with the first usable cycle: its batch is the reference."""
+    """Begin with the first usable cycle: its batch is the reference.
+
+    Random walks that were learned before wear was reset are not looked for again.
+    """
     observation, index, variance = cycle.observation, cycle.timing.index, cycle.variance
     slope_std = settings.slope_std * math.sqrt(variance)
     batch = observation.batch_id if settings.batch is BatchKnowledge.KNOWN else None
+    if state.level_variance == state.slope_variance == 0.0:
+        record = noise_identification.append_cycle(noise_identification.CommissioningRecord(), cycle, batch)
+        state = replace(
+            state,
+            level_variance=settings.level_noise**2 * variance,
+            slope_variance=settings.slope_noise**2 * variance,
+            commissioning=record,
+        )
     return replace(
         state,
         bank=run_length_bank.initial_bank(
@@ -151,14 +162,9 @@ def _first_state(settings: TrackerSettings, state: TrackerState, cycle: UsableCy
         accepted_before=index,
         first_index=index,
         replayed_noise=state.noise,
-        level_variance=settings.level_noise**2 * variance,
-        slope_variance=settings.slope_noise**2 * variance,
         batch_id=observation.batch_id,
         batch_start=index,
         batch_count=1,
-        commissioning=noise_identification.append_cycle(
-            noise_identification.CommissioningRecord(), cycle, batch
-        ),
         common_variance=observation.common_std**2,
         common_cycles=1.0,
     )

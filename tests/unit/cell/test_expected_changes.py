@@ -80,6 +80,17 @@ def test_a_change_that_a_person_said_or_another_model_is_calls_nobody(design, le
     assert called(design, replace(learned, model_changed=True), captures) == []
 
 
+def test_a_surface_that_was_renewed_is_no_deviant_cycle(design, learned):
+    """The first tap after a reset of wear was one, and its alarm stood for twenty cycles."""
+    fresh = core.reset_wear_level(learned)
+    before, after = learned.signature.reference, fresh.signature.reference
+    assert (before.weight > 0.0, after.weight) == (True, 0.0)
+    assert after.variation is before.variation
+    captures = [capture(cycle, 0.16, "A") for cycle in range(AT, AT + 14)]
+    assert called(design, fresh, captures) == []
+    assert "DeviantCycle" in called(design, replace(fresh, signature=learned.signature), captures)
+
+
 @pytest.mark.parametrize("shown", ["nothing first", "at once"])
 def test_the_first_announcement_to_a_module_that_has_started_anew_counts(design, learned, shown):
     """One whose number was the last that had been seen was taken for the one before the start."""

@@ -315,6 +315,26 @@ def test_wear_reset_starts_a_new_reference():
     assert fresh.state.noise.factor == last.state.noise.factor or fresh.used
 
 
+def test_how_friction_walks_stays_learned_over_a_reset_of_wear():
+    """It was taken for steady until the walk was found anew, and each of its turns for a batch."""
+    rng = np.random.default_rng(3)
+    level = 0.2 + np.cumsum(0.6 * STD * rng.standard_normal(700))
+    mu = level + STD * rng.standard_normal(700)
+    readings = [FrictionObservation(i, float(m), STD, (i + 1) * SECOND) for i, m in enumerate(mu)]
+    learned = run(UNKNOWN, readings[:450])[-1].state
+    walks = learned.level_variance, learned.slope_variance
+    assert max(walks) > 0.0
+    outcomes = run(UNKNOWN, readings[450:650], wear_batch.reset_wear_level(learned))
+    assert [(o.state.level_variance, o.state.slope_variance) for o in outcomes[:60]] == [walks] * 60
+    assert not any(o.shift for o in outcomes)
+    off = [(o.wear.level - level[450 + i]) / o.wear.level_std for i, o in enumerate(outcomes)]
+    assert np.sqrt(np.mean(np.square(off))) < 1.5
+    # one that is steady is commissioned as ever
+    steady = run(UNKNOWN, series(300))[-1].state
+    fresh = run(UNKNOWN, series(1), wear_batch.reset_wear_level(steady))[-1].state
+    assert fresh.commissioning is not None
+
+
 @pytest.mark.parametrize("declared", [math.nan, STD, STD / 30.0], ids=["none", "right", "far too small"])
 def test_the_scale_of_the_noise_is_learned(declared):
     readings = [replace(r, mu_s_std=declared) for r in series(600, seed=3)]
