@@ -288,7 +288,12 @@ def _friction_overcome(features: Features, model: Model) -> float:
 
 
 def deceleration_friction(model: Model, mass_kg: float, slide: SlideFeatures) -> float:
-    """mu_k from the mean deceleration of a slide, less what viscous friction took of it."""
+    """mu_k from the mean deceleration of a slide, less what viscous friction took of it.
+
+    nan where the mass is not known: that share goes with it.
+    """
+    if not mass_kg > 0.0:
+        return math.nan
     effect = model.plant.effects.get("viscous_friction", {})
     viscous = float(np.mean(effect.get("viscous_coefficient_n_s_per_m", 0.0)))
     mean_speed = slide.distance.value / max(slide.stop_s - slide.separation_s, 1e-9)

@@ -153,6 +153,14 @@ def test_mu_k_from_the_deceleration_knows_no_more_of_the_scale() -> None:
     assert found.std == pytest.approx(math.hypot(exact.std, 0.3 * found.value), rel=1e-9)
 
 
+@pytest.mark.parametrize("mass_kg", [0.0, -1.0, math.nan])
+def test_a_tap_of_no_mass_has_no_friction_and_no_fault(mass_kg: float) -> None:
+    """With 0 kg it was a division by zero, with less than that a mu_k of 0.6."""
+    found = estimate(replace(Tap().capture(np.random.default_rng(9)), mass_kg=mass_kg), MODEL)
+    assert found.mu_s.quality is found.mu_k.quality is Quality.BAD
+    assert "the part's mass or the actuator's velocity is not known" in found.mu_s.reason
+
+
 @pytest.mark.parametrize("factor", [0.95, 0.97, 1.03])
 @pytest.mark.parametrize("velocity_m_s", [0.04, 0.06, 0.09])
 def test_a_position_quite_wrong_is_named_beside_what_looks_like_it(
