@@ -1,30 +1,24 @@
 """The discrepancy workflow on a campaign, its findings, and the files that it leaves."""
 
-import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from threadpoolctl import threadpool_limits
 
+from impactcell.api.extended_model import write_extended_model
 from impactcell.api.finding_files import write_files
-from impactcell.api.friction import calibrated
 from impactcell.api.machine_findings import investigate_with_base, write_machine_findings
-from impactcell.campaign import Campaign, Excitation, naming, read
+from impactcell.campaign import Campaign, naming, read
 from impactcell.discrepancy.report import json_text, machine_document, result_document, write_reports
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
-from impactcell.errors import CampaignError, PhysicsError, PredictionError
-from impactcell.physics import Plant
+from impactcell.errors import CampaignError
 from impactcell.prediction import Model
-from impactcell.prediction.model import Prior
-from impactcell.settings.model_file import read_model, write_model
-
-SMALLEST_SHARE = 1e-4
-"""Smallest standard deviation of a prior, relative to its value: a prior of none would stop any fit."""
+from impactcell.settings.model_file import read_model
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,10 +128,9 @@ def discrepancy(
             mapper=lambda function, items: list(pool.map(function, items)),
             plant=None if nominal is None else nominal.plant,
         )
-    name = "fitted" if nominal is None else nominal.name
     return _findings(
         result_document(result),
-        lambda output, source: write_findings(result, data, output, source, name),
+        lambda output, source: write_findings(result, data, output, source, nominal),
     )
 
 
@@ -183,95 +176,19 @@ def _findings(outcome: Mapping[str, Any], write: Callable[[Path, str], None]) ->
 
 
 def write_findings(
-    result: DiscrepancyResult, data: Campaign, output: Path, source: str, nominal: str
+    result: DiscrepancyResult, data: Campaign, output: Path, source: str, nominal: Model | None = None
 ) -> None:
-    """Write result.json, the extended model, the report, and the law where one is proposed."""
+    """Write result.json, the extended model, the report, and the law where one is proposed.
+
+    `nominal` is the model whose plant the workflow was given.
+    """
 
     def write(beside: Path) -> None:
         (beside / "result.json").write_text(json_text(result_document(result)), encoding="utf-8")
-        write_model(extended_model(result, data, source, nominal), beside / "model.extended.yaml")
+        write_extended_model(result, data, source, nominal, beside / "model.extended.yaml")
         write_reports(result, source, beside)
         law = result.law.proposed if result.law else None
         if law is not None:
             (beside / f"{law.identifier}.py").write_text(law.text(), encoding="utf-8")
 
     write_files(output, write)
-
-
-def extended_model(result: DiscrepancyResult, data: Campaign, source: str, nominal: str) -> Model:
-    """Make the extended model as a model file holds it, calibrated so that a service can run with it."""
-    plant = _extended_plant(result)
-    half = {one.parameter: (one.high - one.low) / 4.0 for one in result.parameters if not one.effect}
-    ratio = plant.mu_k / plant.mu_s
-    intervals: dict[str, dict[str, tuple[float, float]]] = {}
-    for one in result.parameters:
-        if one.effect and not one.batch and math.isfinite(one.low) and math.isfinite(one.high):
-            intervals.setdefault(one.effect, {})[one.parameter] = (one.low, one.high)
-    model = Model(
-        name=f"{nominal} + {' + '.join(result.added)}" if result.added else nominal,
-        plant=plant,
-        prior=Prior(
-            stiffness_std_n_per_m=_positive(half.get("stiffness_n_per_m", 0.0), plant.stiffness_n_per_m),
-            damping_std_n_s_per_m=_positive(
-                half.get("damping_n_s_per_m", 0.0), max(plant.damping_n_s_per_m, 1.0)
-            ),
-            ratio_std=_positive(half.get("ratio", 0.0) * ratio**2, ratio),
-        ),
-        stroke_m=data.stroke_m,
-        intervals=intervals,
-        provenance={
-            "made by": "impactcell discrepancy",
-            "from": source,
-            "seed": str(result.seed),
-            "verdict": result.verdict,
-            "held-out gap before": f"{result.validation.gap_before:.4g}",
-            "held-out gap after": f"{result.validation.gap_after:.4g}",
-        },
-    )
-    if data.excitation is not Excitation.TAP:
-        return model
-    fitted = {shot.number for shot in result.prepared.shots}
-    try:
-        return calibrated(model, [shot for shot in data.shots if shot.cycle in fitted])
-    except (PredictionError, PhysicsError) as error:
-        note = {**model.provenance, "not calibrated": str(error)}
-        return replace(model, provenance=note)
-
-
-def _extended_plant(result: DiscrepancyResult) -> Plant:
-    """Plant of the final model."""
-    values = {
-        ("", estimate.parameter): estimate.value for estimate in result.parameters if not estimate.effect
-    }
-    effects: dict[str, dict[str, float | Sequence[float]]] = {}
-    for estimate in result.parameters:
-        if not estimate.effect:
-            continue
-        values_of_effect = effects.setdefault(estimate.effect, {})
-        if estimate.batch:
-            values_of_effect[estimate.parameter] = (
-                *_batch_values(values_of_effect.get(estimate.parameter)),
-                estimate.value,
-            )
-        else:
-            values_of_effect[estimate.parameter] = estimate.value
-    mu_k = values["", "mu_k"]
-    ratio = values.get(("", "ratio"), 1.0)
-    return Plant(
-        stiffness_n_per_m=values.get(("", "stiffness_n_per_m"), 6e5),
-        damping_n_s_per_m=values.get(("", "damping_n_s_per_m"), 0.0),
-        mu_s=mu_k * ratio,
-        mu_k=mu_k,
-        gravity_m_s2=result.prepared.gravity_m_s2,
-        effects=effects,
-    )
-
-
-def _batch_values(value: float | Sequence[float] | None) -> Sequence[float]:
-    return value if isinstance(value, Sequence) else ()
-
-
-def _positive(value: float, magnitude: float) -> float:
-    return (
-        value if math.isfinite(value) and value > SMALLEST_SHARE * magnitude else SMALLEST_SHARE * magnitude
-    )

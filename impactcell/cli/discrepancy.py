@@ -63,23 +63,20 @@ def discrepancy(
     if (campaign is None) == (journal is None):
         raise CampaignError("name either a campaign directory or --journal DB")
     check_directory(output, CampaignError)
-    plant = None
-    name = "fitted"
+    model = None
     if cell is not None:
         from impactcell.settings import read_cell
 
-        cell_config = read_cell(cell)
-        plant, name = cell_config.model.plant, cell_config.model.name
+        model = read_cell(cell).model
     elif journal is not None:
-        recording = _recording_model(journal)
-        if recording is not None:
-            plant, name = recording.plant, recording.name
+        model = _recording_model(journal)
+    plant = None if model is None else model.plant
     source, data = _read(campaign, journal, plant)
     with named_steps() as report_step, _mapper(scheduler) as mapper:
         with naming(campaign or journal):
             result = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=report_step)
         report_step("writing the report")
-        write_findings(result, data, output, source, name)
+        write_findings(result, data, output, source, model)
     _print_outcome(output, headline(result), as_json=as_json)
 
 

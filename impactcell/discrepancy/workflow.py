@@ -15,6 +15,7 @@ from impactcell.discrepancy.data import (
 )
 from impactcell.discrepancy.laws import LawFinding, estimate_effects, find_law, hold_against_free_forms
 from impactcell.discrepancy.model import (
+    PLANT_PARAMETERS,
     Fit,
     ParameterEstimate,
     Problem,
@@ -80,6 +81,8 @@ class DiscrepancyResult:
         anything does, and with intervals that hold also for every model that is tied with it.
     law : LawFinding or None
         Where something remains, the law that may be missing; None where nothing does, or nothing can be said.
+    plant : Plant or None
+        Nominal plant that was given.
     """
 
     conclusion: Conclusion
@@ -102,6 +105,7 @@ class DiscrepancyResult:
     unexplained: UnexplainedGap | None
     experiments: tuple[Proposal, ...]
     law: LawFinding | None
+    plant: Plant | None
     seed: int
 
     @property
@@ -113,6 +117,17 @@ class DiscrepancyResult:
     def added(self) -> tuple[str, ...]:
         """Effects that joined the nominal model."""
         return self.conclusion.established
+
+    @property
+    def unseen(self) -> tuple[str, ...]:
+        """Parameters of the nominal plant of which shots of this excitation tell nothing."""
+        free = self.prepared.excitation.free_plant_parameters
+        return tuple(name for name in PLANT_PARAMETERS if name not in free)
+
+    @property
+    def has_whole_plant(self) -> bool:
+        """Whether the plant is known as a whole: by the shots, or as it was given."""
+        return self.plant is not None or not self.unseen
 
 
 def investigate(
@@ -224,6 +239,7 @@ def investigate(
         unexplained=describe_gap(problem, selection.nominal) if conclusion.verdict == UNKNOWN else None,
         experiments=propose_experiments(problem, final, tied),
         law=law,
+        plant=plant,
         seed=seed,
     )
 

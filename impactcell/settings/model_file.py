@@ -1,10 +1,10 @@
 """Model files: what `impactcell calibrate` writes and a cell's YAML names."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, model_validator
@@ -20,6 +20,8 @@ from impactcell.settings.fields import NotNegative, Positive
 
 Interval = tuple[FiniteFloat, FiniteFloat]
 """Lower and upper end."""
+INCOMPLETE: Final = "incomplete"
+"""Key under which a file of a part of a model says what is not known of it: it is no model file."""
 
 HEADER = """\
 # A model of impactcell: plant, how well it is known, and the predictors calibrated to it.
@@ -109,6 +111,13 @@ class ModelFile(_Part):
     provenance: dict[str, str] = {}
     effect_files: list[str] = []
 
+    @model_validator(mode="before")
+    @classmethod
+    def _is_whole(cls, content: object) -> object:
+        if isinstance(content, Mapping) and INCOMPLETE in content:
+            raise ValueError(content[INCOMPLETE])
+        return content
+
     @model_validator(mode="after")
     def _one_predictor_a_tap(self) -> Self:
         ranges = sorted((predictor.mass_kg, *predictor.velocity_range_m_s) for predictor in self.predictors)
@@ -172,7 +181,30 @@ def write_model(model: Model, path: Path) -> None:
     SettingsError
         The file cannot be written.
     """
-    text = HEADER + yaml.safe_dump(_to_mapping(model), sort_keys=False, allow_unicode=True, width=110)
+    _write(_to_mapping(model), path)
+
+
+def write_part_of_model(
+    name: str,
+    missing: str,
+    plant: Mapping[str, object],
+    provenance: Mapping[str, str],
+    path: Path,
+) -> None:
+    """Write what is known of a model where that is a part of it; who reads it as a model is told `missing`.
+
+    Raises
+    ------
+    SettingsError
+        The file cannot be written.
+    """
+    _write(
+        {"format": 1, "name": name, INCOMPLETE: missing, "plant": plant, "provenance": dict(provenance)}, path
+    )
+
+
+def _write(content: Mapping[str, object], path: Path) -> None:
+    text = HEADER + yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=110)
     try:
         write_whole(path, text)
     except OSError as fault:

@@ -62,7 +62,7 @@ def test_it_is_written_as_an_effect_file_that_keeps_the_contract(
     found: DiscrepancyResult, tmp_path: Path
 ) -> None:
     data = with_column(job(8301), COLUMN, 15.0, 40.0, softening)
-    write_findings(found, data, tmp_path, "a campaign", "fitted")
+    write_findings(found, data, tmp_path, "a campaign")
     law = json.loads((tmp_path / "result.json").read_text())["law"]
     assert law["covariates"] == [COLUMN]
     assert 15.0 <= law["tested_range"][COLUMN]["low"] < law["tested_range"][COLUMN]["high"] <= 40.0
@@ -81,7 +81,7 @@ def test_it_is_written_as_an_effect_file_that_keeps_the_contract(
 
 def test_it_is_named_from_then_on_where_the_column_is_there(found: DiscrepancyResult, tmp_path: Path) -> None:
     data = with_column(job(8301), COLUMN, 15.0, 40.0, softening)
-    write_findings(found, data, tmp_path, "a campaign", "fitted")
+    write_findings(found, data, tmp_path, "a campaign")
     (name,) = offer_effects([under_another_name(next(tmp_path.glob("law_of_*.py")))])
     try:
         other = with_column(job(8305), COLUMN, 15.0, 40.0, softening)

@@ -175,7 +175,7 @@ def test_what_an_earlier_run_has_left_stays_when_this_one_fails(
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("impactcell.api.findings.write_model", interrupt)
+    monkeypatch.setattr("impactcell.api.findings.write_extended_model", interrupt)
     with pytest.raises(KeyboardInterrupt):
         discrepancy(tmp_path / "campaign", tmp_path / "out")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["result.json"]

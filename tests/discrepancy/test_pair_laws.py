@@ -62,7 +62,7 @@ def test_drag_is_found_to_go_with_speed_and_column(oil: DiscrepancyResult) -> No
 def test_it_is_written_with_both_ranges_and_named_from_then_on(
     oil: DiscrepancyResult, tmp_path: Path
 ) -> None:
-    write_findings(oil, oil_campaign(8601, shots=SHOTS), tmp_path, "a campaign", "fitted")
+    write_findings(oil, oil_campaign(8601, shots=SHOTS), tmp_path, "a campaign")
     law = json.loads((tmp_path / "result.json").read_text())["law"]
     assert law["covariates"] == ["speed", COLUMN]
     assert LOWEST <= law["tested_range"][COLUMN]["low"] < law["tested_range"][COLUMN]["high"] <= HIGHEST

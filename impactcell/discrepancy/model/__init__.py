@@ -28,6 +28,7 @@ from impactcell.discrepancy.model.linearisation import (
     unmet_gradient,
 )
 from impactcell.discrepancy.model.parameters import (
+    PLANT_PARAMETERS,
     Coordinate,
     effect_coordinates,
     parameter_name,
@@ -48,6 +49,7 @@ from impactcell.discrepancy.model.told_settings import (
 )
 
 __all__ = [
+    "PLANT_PARAMETERS",
     "SETTINGS",
     "Constraints",
     "ContactScatter",

@@ -87,6 +87,8 @@ NOMINAL_COORDINATES = (
     Coordinate("", "ratio", 0, "log", 1.0, math.log(MIN_RATIO), math.log(MAX_RATIO), 0.25),
 )
 """Free numbers of the nominal plant: far wider than any material, so that no bound decides."""
+PLANT_PARAMETERS = tuple(coordinate.parameter for coordinate in NOMINAL_COORDINATES)
+"""Their names; `ratio` is mu_s / mu_k."""
 
 
 def nominal_coordinates(free: tuple[str, ...]) -> tuple[Coordinate, ...]:

@@ -1,0 +1,165 @@
+"""The model that the discrepancy workflow leaves: the nominal one, refitted, with what was missing."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from impactcell.api.friction import calibrated
+from impactcell.campaign import Campaign, Excitation
+from impactcell.discrepancy.workflow import DiscrepancyResult
+from impactcell.errors import PhysicsError, PredictionError
+from impactcell.physics import Plant
+from impactcell.prediction import Model
+from impactcell.prediction.model import Prior
+from impactcell.settings.model_file import write_model, write_part_of_model
+
+SMALLEST_SHARE = 1e-4
+"""Smallest standard deviation of a prior, relative to its value: a prior of none would stop any fit."""
+
+
+def write_extended_model(
+    result: DiscrepancyResult, data: Campaign, source: str, nominal: Model | None, path: Path
+) -> None:
+    """Write the extended model; only what is known of it where the shots tell of a part of the plant alone.
+
+    Parameters
+    ----------
+    result : DiscrepancyResult
+    data : Campaign
+        What it was found in.
+    source : str
+        Where the data come from.
+    nominal : Model or None
+        Model whose plant the workflow was given.
+    path : Path
+        File to write.
+
+    Raises
+    ------
+    SettingsError
+        The file cannot be written.
+    """
+    if result.has_whole_plant:
+        write_model(_extended_model(result, data, source, nominal), path)
+        return
+    shots = str(data.excitation).replace("_", " ")
+    said = (
+        f"no cell can run with it: {shots} shots tell nothing of {_unseen(result)}; name the cell whose "
+        "model is to be extended, `impactcell discrepancy CAMPAIGN --cell CELL.yaml -o DIR`"
+    )
+    plant = {
+        **{one.parameter: one.value for one in result.parameters if not one.effect},
+        "gravity_m_s2": result.prepared.gravity_m_s2,
+        "effects": _effects(result),
+    }
+    write_part_of_model(_name(result, nominal), said, plant, _provenance(result, source), path)
+
+
+def _extended_model(result: DiscrepancyResult, data: Campaign, source: str, nominal: Model | None) -> Model:
+    """Make the extended model as a model file holds it, calibrated so that a service can run with it."""
+    plant = _extended_plant(result, None if nominal is None else nominal.plant)
+    provenance = _provenance(result, source)
+    if result.unseen:
+        provenance["not seen in these shots, so as before"] = _unseen(result)
+    model = Model(
+        name=_name(result, nominal),
+        plant=plant,
+        prior=_prior(result, plant, None if nominal is None else nominal.prior),
+        stroke_m=nominal.stroke_m if nominal is not None and result.unseen else data.stroke_m,
+        intervals=_intervals(result),
+        provenance=provenance,
+    )
+    if data.excitation is not Excitation.TAP:
+        return model
+    fitted = {shot.number for shot in result.prepared.shots}
+    try:
+        return calibrated(model, [shot for shot in data.shots if shot.cycle in fitted])
+    except (PredictionError, PhysicsError) as error:
+        note = {**model.provenance, "not calibrated": str(error)}
+        return replace(model, provenance=note)
+
+
+def _name(result: DiscrepancyResult, nominal: Model | None) -> str:
+    return " + ".join(("fitted" if nominal is None else nominal.name, *result.added))
+
+
+def _unseen(result: DiscrepancyResult) -> str:
+    return ", ".join("mu_s / mu_k" if name == "ratio" else name for name in result.unseen)
+
+
+def _provenance(result: DiscrepancyResult, source: str) -> dict[str, str]:
+    return {
+        "made by": "impactcell discrepancy",
+        "from": source,
+        "seed": str(result.seed),
+        "verdict": result.verdict,
+        "held-out gap before": f"{result.validation.gap_before:.4g}",
+        "held-out gap after": f"{result.validation.gap_after:.4g}",
+    }
+
+
+def _extended_plant(result: DiscrepancyResult, nominal: Plant | None) -> Plant:
+    """Plant of the final model; what these shots tell nothing of is as it was given."""
+    given = {}
+    if nominal is not None:
+        given = {
+            "stiffness_n_per_m": nominal.stiffness_n_per_m,
+            "damping_n_s_per_m": nominal.damping_n_s_per_m,
+            "ratio": nominal.mu_s / nominal.mu_k,
+        }
+    values = given | {one.parameter: one.value for one in result.parameters if not one.effect}
+    return Plant(
+        stiffness_n_per_m=values["stiffness_n_per_m"],
+        damping_n_s_per_m=values["damping_n_s_per_m"],
+        mu_s=values["mu_k"] * values["ratio"],
+        mu_k=values["mu_k"],
+        gravity_m_s2=result.prepared.gravity_m_s2,
+        effects=_effects(result),
+    )
+
+
+def _prior(result: DiscrepancyResult, plant: Plant, nominal: Prior | None) -> Prior:
+    """Tell how well the plant is known; what these shots tell nothing of, as well as before."""
+    half = {one.parameter: (one.high - one.low) / 4.0 for one in result.parameters if not one.effect}
+    ratio = plant.mu_k / plant.mu_s
+    fitted = {
+        "stiffness_std_n_per_m": (half.get("stiffness_n_per_m"), plant.stiffness_n_per_m),
+        "damping_std_n_s_per_m": (half.get("damping_n_s_per_m"), max(plant.damping_n_s_per_m, 1.0)),
+        "ratio_std": (half["ratio"] * ratio**2 if "ratio" in half else None, ratio),
+    }
+    return Prior(
+        **{
+            name: getattr(nominal, name) if std is None else _positive(std, magnitude)
+            for name, (std, magnitude) in fitted.items()
+        }
+    )
+
+
+def _intervals(result: DiscrepancyResult) -> Mapping[str, Mapping[str, tuple[float, float]]]:
+    """Intervals of the effects' parameters, but of what has one value a batch."""
+    intervals: dict[str, dict[str, tuple[float, float]]] = {}
+    for one in result.parameters:
+        if one.effect and not one.batch and math.isfinite(one.low) and math.isfinite(one.high):
+            intervals.setdefault(one.effect, {})[one.parameter] = (one.low, one.high)
+    return intervals
+
+
+def _effects(result: DiscrepancyResult) -> dict[str, dict[str, float | Sequence[float]]]:
+    """Parameters of the effects; a value a batch in a row."""
+    effects: dict[str, dict[str, float | Sequence[float]]] = {}
+    for one in result.parameters:
+        if not one.effect:
+            continue
+        values = effects.setdefault(one.effect, {})
+        if one.batch:
+            before = values.get(one.parameter)
+            values[one.parameter] = (*(before if isinstance(before, Sequence) else ()), one.value)
+        else:
+            values[one.parameter] = one.value
+    return effects
+
+
+def _positive(std: float, magnitude: float) -> float:
+    smallest = SMALLEST_SHARE * magnitude
+    return max(std, smallest) if math.isfinite(std) else smallest

@@ -1,0 +1,76 @@
+"""The model that the workflow leaves: what shots tell nothing of is as it was, or there is no whole model."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from impactcell import campaign as campaigns
+from impactcell.api.extended_model import write_extended_model
+from impactcell.campaign import Campaign
+from impactcell.cli.accept_model import accept_model
+from impactcell.cli.discrepancy import discrepancy
+from impactcell.discrepancy.workflow import investigate
+from impactcell.errors import SettingsError
+from impactcell.settings import read_cell
+from impactcell.settings.model_file import read_model
+from tests.benchmarks._discrepancy_driven import Job, record
+from tests.discrepancy.study import write_blank_report
+from tests.discrepancy.test_verdicts import free_slides
+
+CELL = Path("config/cells/prototype.yaml")
+
+
+def slides() -> Campaign:
+    """Free slides of the cell's part."""
+    made = free_slides()[0]
+    shots = tuple(replace(shot, mass_kg=18.9) for shot in made.shots)
+    return replace(made, shots=shots, columns=("shot", "mass_kg"))
+
+
+def test_free_slides_leave_the_contact_of_a_cell_as_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("impactcell.api.findings.write_reports", write_blank_report)
+    campaigns.write(slides(), tmp_path / "campaign")
+    discrepancy(tmp_path / "campaign", tmp_path / "out", cell=CELL)
+    before, after = read_cell(CELL).model, read_model(tmp_path / "out" / "model.extended.yaml")
+    assert after.plant.mu_k == pytest.approx(0.2, rel=0.05)
+    assert after.plant.mu_k != before.plant.mu_k
+    assert after.ratio == pytest.approx(before.ratio, rel=1e-12)
+    for name in ("stiffness_n_per_m", "damping_n_s_per_m"):
+        assert getattr(after.plant, name) == getattr(before.plant, name)
+    assert after.prior == before.prior
+    assert after.provenance["not seen in these shots, so as before"] == (
+        "stiffness_n_per_m, damping_n_s_per_m, mu_s / mu_k"
+    )
+
+
+def test_free_slides_alone_make_no_model_for_a_cell_and_the_report_offers_none(tmp_path: Path) -> None:
+    campaigns.write(slides(), tmp_path / "campaign")
+    discrepancy(tmp_path / "campaign", tmp_path / "out")
+    extended = tmp_path / "out" / "model.extended.yaml"
+    with pytest.raises(SettingsError, match=r"model\.extended\.yaml:.*no cell can run with it.*--cell"):
+        accept_model(CELL, extended)
+    assert "mu_k: 0.2" in extended.read_text(encoding="utf-8")
+    assert "stiffness" not in extended.read_text(encoding="utf-8").partition("plant:")[2]
+    assert json.loads((tmp_path / "out" / "result.json").read_text())["model"] == "model.extended.yaml"
+    for name, unseen in (("report.html", "stiffness, damping, µs/µk"), ("report.de.html", "Steifigkeit,")):
+        page = (tmp_path / "out" / name).read_text(encoding="utf-8")
+        assert "model accept" not in page
+        assert unseen in page
+
+
+def test_a_driven_record_leaves_the_contact_of_a_plant_as_it_was(tmp_path: Path) -> None:
+    model = read_model(Path("config/models/prototype.yaml"))
+    nominal = replace(model, plant=replace(model.plant, effects={}))
+    data = record(Job("", 7302, coloured=True))
+    found = investigate(data, library=(), plant=nominal.plant)
+    write_extended_model(found, data, "a record", nominal, tmp_path / "extended.yaml")
+    extended = read_model(tmp_path / "extended.yaml")
+    assert extended.plant.stiffness_n_per_m == nominal.plant.stiffness_n_per_m
+    assert extended.plant.damping_n_s_per_m == nominal.plant.damping_n_s_per_m
+    assert extended.prior.stiffness_std_n_per_m == nominal.prior.stiffness_std_n_per_m
+    assert extended.plant.mu_k != nominal.plant.mu_k
+    assert extended.prior.ratio_std != nominal.prior.ratio_std
