@@ -31,6 +31,19 @@ class RecordedCampaign:
     no_channels: int
     sessions: int
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Say what was left out, and where numbers repeat."""
+        said = (
+            (self.other_stroke > 0, f"{self.other_stroke} cycles with another stroke were left out"),
+            (self.no_channels > 0, f"{self.no_channels} cycles without samples were left out"),
+            (
+                self.sessions > 1,
+                f"the module restarted meanwhile: cycles of {self.sessions} sessions have these numbers",
+            ),
+        )
+        return tuple(note for holds, note in said if holds)
+
 
 def from_captures(captures: Iterable[Capture], gravity_m_s2: float = 9.81) -> RecordedCampaign:
     """Make a tap campaign of recorded captures, in their order.

@@ -229,13 +229,17 @@ def export(
     journal: Annotated[Path, typer.Argument(metavar="DB", help="A cell's journal.")],
     output: Directory,
     *,
+    cell: Annotated[
+        Path | None,
+        typer.Option(metavar="CELL.yaml", help="Cell that recorded it: states mass and stroke."),
+    ] = None,
     first_cycle: Annotated[int | None, typer.Option(help="First cycle to export.")] = None,
     last_cycle: Annotated[int | None, typer.Option(help="Last cycle to export.")] = None,
 ) -> None:
     """Write a campaign directory from the captures of a journal."""
     from impactcell.cli.export import export as run_export
 
-    run_export(journal, output, first_cycle=first_cycle, last_cycle=last_cycle)
+    run_export(journal, output, cell=cell, first_cycle=first_cycle, last_cycle=last_cycle)
 
 
 @verb(app)

@@ -1,6 +1,7 @@
 """`impactcell discrepancy`: where model and measurement disagree, and what is missing."""
 
 import json
+import math
 import os
 import sys
 from collections.abc import Iterator
@@ -11,8 +12,8 @@ from pathlib import Path
 from impactcell.api.findings import write_findings
 from impactcell.api.machine_findings import investigate_with_base, write_machine_findings
 from impactcell.campaign import Campaign, naming, read
-from impactcell.campaign.recorded_campaign import from_captures
 from impactcell.cli.paths import check_directory, note_damage, open_journal
+from impactcell.cli.recorded_taps import campaign_of_taps
 from impactcell.discrepancy.report import headline, machine_headline
 from impactcell.discrepancy.search import Mapper
 from impactcell.discrepancy.workflow import investigate
@@ -22,6 +23,7 @@ from impactcell.prediction import Model
 from impactcell.process.console import print_note, print_result
 from impactcell.process.extras import how_to_install
 from impactcell.process.progress import named_steps
+from impactcell.settings import CellConfig, read_cell
 
 
 def discrepancy(
@@ -43,7 +45,8 @@ def discrepancy(
     output : Path
         Directory for the results; what it holds of an earlier run is replaced only when all is done.
     cell : Path, optional
-        Cell whose model is the nominal one.
+        Cell whose model is the nominal one; with `journal` the one that recorded it, which states mass and
+        stroke where its module reports none.
     journal : Path, optional
         Journal whose recorded captures are used instead of a campaign.
     seed : int
@@ -63,15 +66,12 @@ def discrepancy(
     if (campaign is None) == (journal is None):
         raise CampaignError("name either a campaign directory or --journal DB")
     check_directory(output, CampaignError)
-    model = None
-    if cell is not None:
-        from impactcell.settings import read_cell
-
-        model = read_cell(cell).model
-    elif journal is not None:
+    config = None if cell is None else read_cell(cell)
+    model = None if config is None else config.model
+    if model is None and journal is not None:
         model = _recording_model(journal)
     plant = None if model is None else model.plant
-    source, data = _read(campaign, journal, plant)
+    source, data = _read(campaign, journal, plant, config)
     with named_steps() as report_step, _mapper(scheduler) as mapper:
         with naming(campaign or journal):
             result = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=report_step)
@@ -128,18 +128,21 @@ def _print_outcome(output: Path, said: str, *, as_json: bool) -> None:
     print_result(f"{said}\n{output / 'report.html'}")
 
 
-def _read(campaign: Path | None, journal: Path | None, plant: Plant | None) -> tuple[str, Campaign]:
+def _read(
+    campaign: Path | None, journal: Path | None, plant: Plant | None, config: CellConfig | None
+) -> tuple[str, Campaign]:
     if journal is None:
         assert campaign is not None  # noqa: S101 - one of them is given
         return str(campaign.name), read(campaign)
     with open_journal(journal) as store:
-        try:
-            recorded = from_captures(
-                store.captures(damaged=note_damage), plant.gravity_m_s2 if plant else 9.81
-            )
-        except CampaignError as error:
-            raise CampaignError(f"{journal}: {error}") from error
-    return str(journal.name), recorded.campaign
+        gravity_m_s2 = plant.gravity_m_s2 if plant else 9.81
+        data = campaign_of_taps(journal, store.captures(damaged=note_damage), gravity_m_s2, config)
+    if math.isinf(data.stroke_m) and config is None:
+        raise CampaignError(
+            f"{journal}: the module did not report its stroke, after which the actuator halts; name the cell "
+            "that recorded these taps, --cell CELL.yaml: it states `actuator.stroke_mm`"
+        )
+    return str(journal.name), data
 
 
 def _recording_model(journal: Path) -> Model | None:

@@ -1,7 +1,6 @@
 """`impactcell model fit`: a cell's first model, from a campaign or the running cell's own first taps."""
 
 import json
-import math
 import sys
 from dataclasses import replace
 from itertools import islice
@@ -10,10 +9,10 @@ from typing import Final
 
 from impactcell.api.first_model import TAPS, FirstModel, fit_first_model
 from impactcell.campaign import Campaign, read
-from impactcell.campaign.recorded_campaign import from_captures
 from impactcell.cli.accept_model import put_into_service
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.paths import note_damage, open_journal
+from impactcell.cli.recorded_taps import campaign_of_taps
 from impactcell.errors import CampaignError, PredictionError, SettingsError
 from impactcell.process.console import print_note, print_result
 from impactcell.settings import CellConfig, read_cell
@@ -92,9 +91,9 @@ def say_first_model(first: FirstModel, target: Path | None, *, as_json: bool = F
         print_result("good enough to estimate friction with")
 
 
-def _taps(config: CellConfig, campaign: Path | None, taps: int) -> tuple[str, Campaign]:
-    if campaign is not None:
-        return campaign.name, read(campaign)
+def _taps(config: CellConfig, recorded: Path | None, taps: int) -> tuple[str, Campaign]:
+    if recorded is not None:
+        return recorded.name, read(recorded)
     if config.settings.journal is None:
         raise SettingsError(f"{config.path}: the cell keeps no journal; name a campaign with --campaign")
     path = config.settings.journal.file
@@ -104,10 +103,5 @@ def _taps(config: CellConfig, campaign: Path | None, taps: int) -> tuple[str, Ca
         raise CampaignError(
             f"{path.name}: no taps are in it yet; run the cell, and come back after {TAPS} taps"
         )
-    mass_kg, stroke_mm = config.settings.part.mass_kg, config.settings.actuator.stroke_mm
-    if mass_kg is not None:
-        captures = [replace(c, mass_kg=mass_kg) if math.isnan(c.mass_kg) else c for c in captures]
-    if stroke_mm is not None:
-        stroke_m = 1e-3 * stroke_mm
-        captures = [replace(c, stroke_m=stroke_m) if math.isinf(c.stroke_m) else c for c in captures]
-    return f"journal {path.name}", from_captures(captures, config.model.plant.gravity_m_s2).campaign
+    campaign = campaign_of_taps(path, captures, config.model.plant.gravity_m_s2, config)
+    return f"journal {path.name}", campaign
