@@ -74,7 +74,7 @@ class Campaign:
     excitation : Excitation
     gravity_m_s2 : float
     stroke_m : float
-        Travel of the actuator from first contact; inf where it never halts or there is none.
+        Travel of the actuator from first contact; inf where it halts as it loses contact, or there is none.
     sensors : mapping
         `force`, `position` and `actuator`, those that were recorded.
     shots : tuple of Capture

@@ -1,6 +1,7 @@
 """What the discrepancy workflow is given: cells, journals, and data with something wrong or missing."""
 
 import io
+import itertools
 import json
 import math
 from collections.abc import Callable
@@ -12,7 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from impactcell import campaign as campaigns
-from impactcell.campaign import Campaign
+from impactcell.campaign import Campaign, Excitation, Sensor
 from impactcell.cli.app import app
 from impactcell.cli.discrepancy import discrepancy
 from impactcell.discrepancy.data.prepared_campaign import prepare
@@ -27,6 +28,7 @@ from impactcell.settings.model_file import read_model
 from tests.discrepancy.study import strengths, write_blank_report
 from tests.discrepancy.test_workflow import make
 from tests.snapshots import make_snapshot
+from tests.taps import Tap
 
 PROTOTYPE = Path("config/cells/prototype.yaml")
 
@@ -106,6 +108,20 @@ def test_an_empty_journal_is_said_by_name(tmp_path: Path) -> None:
     with pytest.raises(CampaignError, match="j: no capture with samples"):
         discrepancy(None, tmp_path / "out", journal=tmp_path / "j")
     assert not (tmp_path / "out").exists()
+
+
+def test_without_a_stroke_the_actuator_halts_as_it_loses_contact() -> None:
+    """As the campaign format has it: one that goes on catches up with the part, and pushes it again."""
+    rng = np.random.default_rng(2)
+    settings = itertools.product(range(2), (3500, 5500), (18.9, 25.2), (1, -1))
+    taps = [
+        Tap(velocity / 6e4, 0.2 * math.exp(0.01 * rng.normal()), mass_kg=mass, direction=sign, effects={})
+        for _, velocity, mass, sign in settings
+    ]
+    shots = tuple(tap.capture(rng, cycle=number) for number, tap in enumerate(taps, 1))
+    sensors = {"force": Sensor(1e4, 0.4), "position": Sensor(1e4, 1.5e-6)}
+    found = investigate(Campaign(Excitation.TAP, shots, sensors=sensors))
+    assert found.verdict == "no_gap"
 
 
 def test_unequal_rates_and_gaps_in_time_cost_nothing_but_are_said() -> None:

@@ -44,6 +44,7 @@ class ForwardModel:
                 mass_kg=shot.mass_kg if math.isfinite(shot.mass_kg) else 1.0,
                 stroke_m=self.shots.stroke_m,
                 direction=shot.direction,
+                halts_at_separation=has_contact and math.isinf(self.shots.stroke_m),
                 start_m=shot.start_m,
                 dwell_s=shot.dwell_s,
                 shot=shot.record,
