@@ -13,7 +13,12 @@ from typing import TextIO
 from impactcell.api.friction import calibrated_where_possible, with_masses
 from impactcell.campaign import Campaign, Excitation, from_contact, naming, read
 from impactcell.cli.paths import check_output
-from impactcell.discrepancy.data import check_campaign_units, notes_of_unlike, without_unlike_shots
+from impactcell.discrepancy.data import (
+    check_campaign_units,
+    notes_of_unlike,
+    refuse_rotation,
+    without_unlike_shots,
+)
 from impactcell.errors import CampaignError, PredictionError
 from impactcell.features import Features, extract
 from impactcell.prediction import Model, estimate_from_features
@@ -61,6 +66,8 @@ def estimate(
     if output is not None:
         check_output(output, CampaignError)
     campaign_data, notes = from_contact(read(campaign))
+    with naming(campaign):
+        refuse_rotation(campaign_data)
     for note in notes:
         print_note(note)
     if campaign_data.excitation is Excitation.DRIVEN:

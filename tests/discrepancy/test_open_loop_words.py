@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from impactcell.api.machine_findings import write_machine_findings
-from impactcell.campaign import Campaign, Coordinate, Excitation
+from impactcell.campaign import Campaign, Coordinate, Excitation, write
+from impactcell.cli.estimate import estimate
 from impactcell.discrepancy.data import prepare
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, investigate_machine
 from impactcell.discrepancy.report import sentences
@@ -18,6 +19,7 @@ from impactcell.errors import CampaignError
 from impactcell.german.findings import german_headline
 from impactcell.german.open_loop import german_open_loop_sentence, open_loop_sentence
 from impactcell.records import Capture, Channel
+from impactcell.web.texts.import_faults import page_fault
 
 PENDULUM = BaseModel(
     coordinate=Coordinate.ROTATION,
@@ -86,6 +88,26 @@ def test_what_turns_is_asked_for_a_base_model() -> None:
     """Radians a second are no share of gravity: no unit is wrong where a base model is missing."""
     with pytest.raises(CampaignError, match=r"give a base model \(--base"):
         prepare(swings([3.0] * 6, 8.0))
+
+
+def test_a_run_down_of_what_turns_is_no_slide(tmp_path: Path) -> None:
+    """At 2 rad/s² it seemed to be a part on a surface of mu_k = 0.204, and that was good."""
+    time = np.arange(0.0, 2.0, 1e-3)
+    rng = np.random.default_rng(3)
+    shots = tuple(
+        Capture(number, math.nan, 0.02, None, Channel(time, angle + rng.normal(0.0, 1e-4, time.size), 1e-4))
+        for number, speed in enumerate(np.linspace(3.0, 4.0, 12), 1)
+        for until in [np.minimum(time, speed / 2.0)]
+        for angle in [speed * until - until**2]
+    )
+    given = Campaign(Excitation.FREE_SLIDE, shots, coordinate=Coordinate.ROTATION)
+    with pytest.raises(CampaignError, match=r"what turns .* \(--base"):
+        prepare(given)
+    write(given, tmp_path / "wheel")
+    with pytest.raises(CampaignError, match=r"wheel: what turns .* \(--base") as refused:
+        estimate(tmp_path / "wheel")
+    language, said = page_fault(str(refused.value), "de")
+    assert (language, "Grundmodell" in said) == ("de", True)
 
 
 @pytest.mark.parametrize("gravity", [0.55, 0.0])

@@ -1,6 +1,10 @@
 """What the workflow works on: shots and blocks, checked, grouped and split, and the noise floor."""
 
-from impactcell.discrepancy.data.campaign_checks import check_campaign_units, without_unlike_shots
+from impactcell.discrepancy.data.campaign_checks import (
+    check_campaign_units,
+    refuse_rotation,
+    without_unlike_shots,
+)
 from impactcell.discrepancy.data.excitation import MIN_HELD_OUT, MIN_TRAINING, ExcitationStrategy
 from impactcell.discrepancy.data.free_slide import FreeSlide
 from impactcell.discrepancy.data.noise_floor import (
@@ -51,6 +55,7 @@ __all__ = [
     "decimate",
     "notes_of_unlike",
     "prepare",
+    "refuse_rotation",
     "replicate_spread",
     "sensor_noise",
     "shot_set",

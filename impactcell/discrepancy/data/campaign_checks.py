@@ -16,6 +16,21 @@ TELLING = (*UNUSABLE, Fault.COPY, Fault.CLIPPING, Fault.DROPOUTS)
 """Faults of a record that say why a shot is unlike the others, better than a column to check."""
 
 
+def refuse_rotation(campaign: Campaign) -> None:
+    """Refuse what turns: the workflow of parts, and the estimates, are of what slides under its weight.
+
+    Raises
+    ------
+    CampaignError
+        The coordinate is an angle.
+    """
+    if campaign.coordinate is Coordinate.ROTATION:
+        raise CampaignError(
+            "what turns is no part that slides under its weight: give a base model (--base BASE.yaml of "
+            "`impactcell discrepancy`)"
+        )
+
+
 def check_campaign_units(campaign: Campaign) -> None:
     """Notice a unit that is wrong by a large factor, as `prepare` does, however few the shots.
 
@@ -39,14 +54,7 @@ def check_shot_units(campaign: Campaign, shots: Sequence[PreparedShot]) -> None:
         With the columns whose unit to check.
     """
     strategy = STRATEGIES[campaign.excitation]
-    try:
-        check_units(strategy.unit_ratios(shot, campaign.gravity_m_s2) for shot in shots)
-    except CampaignError as error:
-        if campaign.coordinate is not Coordinate.ROTATION:
-            raise
-        raise CampaignError(
-            "what turns is no part that slides under its weight: give a base model (--base BASE.yaml)"
-        ) from error
+    check_units(strategy.unit_ratios(shot, campaign.gravity_m_s2) for shot in shots)
 
 
 def without_unlike_shots(
@@ -61,7 +69,7 @@ def without_unlike_shots(
     unlike : dict of int to str
         What to check in each shot that is left out, by its number.
     """
-    if campaign.excitation is Excitation.DRIVEN or campaign.coordinate is Coordinate.ROTATION:
+    if campaign.excitation is Excitation.DRIVEN:
         return campaign, {}
     strategy = STRATEGIES[campaign.excitation]
     shots = [

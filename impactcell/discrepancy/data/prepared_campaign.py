@@ -13,6 +13,7 @@ import numpy as np
 from impactcell.campaign import Campaign, Excitation, from_contact
 from impactcell.discrepancy.data.campaign_checks import (
     check_shot_units,
+    refuse_rotation,
     without_unlike_shots,
 )
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
@@ -75,8 +76,9 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     Raises
     ------
     CampaignError
-        Too few shots for any test, or a unit that is wrong by a large factor.
+        Too few shots for any test, a unit that is wrong by a large factor, or an angle for a coordinate.
     """
+    refuse_rotation(campaign)
     strategy = STRATEGIES[campaign.excitation]
     whole = campaign
     campaign, pretrigger = from_contact(whole)

@@ -199,6 +199,11 @@ FAULTS: Final = (
         "Einheiten angeben",
     ),
     FaultPattern(
+        r"what turns is no part that slides under its weight: .*",
+        "what turns needs a base model, which “impactcell discrepancy --base” takes in a shell",
+        "was sich dreht, braucht ein Grundmodell; „impactcell discrepancy --base“ nimmt es in einer Shell",
+    ),
+    FaultPattern(
         r"the position is a short push, as the force of a tap is, .*",
         "the position is a short push, as the force of a tap is, and the force stays where it went, as a "
         "part does: they look swapped; choose their columns, and give their units, in the form below",
