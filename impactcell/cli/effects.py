@@ -5,7 +5,15 @@ from pathlib import Path
 
 from impactcell.errors import EffectError, PhysicsError
 from impactcell.physics.effect_contract import contract_faults
-from impactcell.physics.outside_effects import effect_files, load_effect, offer_effects, offer_installed
+from impactcell.physics.effects import LIBRARY, withdraw_effect
+from impactcell.physics.outside_effects import (
+    effect_files,
+    load_effect,
+    offer_effects,
+    offer_installed,
+    source_of,
+)
+from impactcell.physics.usable_effect import faults_of_use
 from impactcell.process.console import print_note, print_result
 
 
@@ -15,12 +23,21 @@ def offer(paths: Sequence[Path]) -> None:
     Raises
     ------
     EffectError
-        What cannot be used, a line each.
+        What cannot be used, a line each; nothing is offered then.
     """
     try:
         offered = (*offer_installed(), *offer_effects(paths))
     except PhysicsError as error:
         raise EffectError(str(error)) from error
+    faults = [
+        f"{source_of(identifier) or identifier}: {fault}"
+        for identifier in offered
+        for fault in faults_of_use(LIBRARY[identifier])
+    ]
+    if faults:
+        for identifier in offered:
+            withdraw_effect(identifier)
+        raise EffectError("\n".join(faults))
     if offered:
         print_note(f"offered beside the library: {', '.join(offered)}")
 

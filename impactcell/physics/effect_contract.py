@@ -5,18 +5,17 @@ The same promises are tested of the library in `tests/contract`; here an effect 
 
 import inspect
 import math
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from impactcell.errors import PhysicsError
-from impactcell.numerics.jit import address
-from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
+from impactcell.physics.effect import Effect, LawKind, Parameter
 from impactcell.physics.effects import LIBRARY, offer_effect, withdraw_effect
 from impactcell.physics.ensemble import Ensemble
 from impactcell.physics.plant import TapInput
+from impactcell.physics.usable_effect import faults_of_use
 from impactcell.records import Samples
 
 NOMINAL = np.array([6.5e5, 465.0, 0.2, 0.152])
@@ -51,13 +50,11 @@ ARGUMENTS = (1e-3, 1e-2, 18.9, 9.81)
 """Four numbers at which any law has to have a value: small, positive, and the last two mass and gravity."""
 ENERGY_DRAWS = 2000
 """Places at which the sign of the power is looked at."""
-SUFFIXES = {"m": "_m", "s": "_s", "N": "_n", "rad": "_rad", "1/m": "_per_m", "m/s": "_m_s"}
-"""End of a parameter's name for its unit."""
 
 
 def contract_faults(effect: Effect) -> list[str]:
     """Say what of the contract an effect breaks; an empty list is the answer one hopes for."""
-    faults = [*_statement(effect), *_documentation(effect), *_compilation(effect)]
+    faults = [*faults_of_use(effect), *_documentation(effect)]
     if faults:
         return faults
     is_new = effect.identifier not in LIBRARY
@@ -75,50 +72,6 @@ def contract_faults(effect: Effect) -> list[str]:
             withdraw_effect(effect.identifier)
 
 
-def _statement(effect: Effect) -> list[str]:
-    between = effect.between is not None
-    said = [
-        (bool(effect.equation.strip()), "it gives no equation"),
-        (bool(effect.reference.strip()), "it gives no reference"),
-        (
-            bool(effect.phases) and all(isinstance(p, Phase) for p in effect.phases),
-            "it names no phase in which it shows",
-        ),
-        (bool(effect.laws) != between, "it needs either laws or between=, not both"),
-        (
-            all(low < high and np.isfinite([low, high]).all() for low, high in effect.columns.values()),
-            "a column's range has to be two ascending numbers",
-        ),
-        (effect.kind is not Kind.BETWEEN_SHOTS or between, "what acts between shots needs between="),
-        (bool(effect.parameters), "it has no parameter"),
-        (
-            any(not math.isnan(p.null) for p in effect.parameters),
-            "no parameter has a null value at which the effect vanishes",
-        ),
-    ]
-    faults = [fault for holds, fault in said if not holds]
-    for p in effect.parameters:
-        faults += _parameter(p)
-    return faults
-
-
-def _parameter(p: Parameter) -> list[str]:
-    ending = SUFFIXES.get(p.unit, "")
-    said = [
-        (bool(p.unit), f"{p.name} has no unit; write 1 for none"),
-        (bool(re.fullmatch(r"[a-z][a-z0-9_]*", p.name)), f"{p.name!r} is no name in lower case"),
-        (p.name.endswith(ending), f"{p.name} is in {p.unit}: its name has to end with {ending}"),
-        (p.lower < p.upper, f"{p.name}: lower {p.lower:g} is not below upper {p.upper:g}"),
-        (p.lower <= p.typical <= p.upper, f"{p.name}: typical {p.typical:g} is not within its range"),
-        (
-            math.isnan(p.null) or p.lower <= p.null <= p.upper,
-            f"{p.name}: null {p.null:g} is not within its range",
-        ),
-        (p.typical != p.null, f"{p.name}: its typical value is its null value, at which it does nothing"),
-    ]
-    return [fault for holds, fault in said if not holds]
-
-
 def _documentation(effect: Effect) -> list[str]:
     functions: list[Callable[..., object]] = [*effect.laws.values()]
     if effect.between is not None:
@@ -131,21 +84,6 @@ def _documentation(effect: Effect) -> list[str]:
     module = inspect.getmodule(functions[0]) if functions else None
     if module is not None and not (module.__doc__ or "").strip():
         faults.append("its file has no docstring that says what it is in a sentence")
-    return faults
-
-
-def _compilation(effect: Effect) -> list[str]:
-    faults = []
-    for kind, law in effect.laws.items():
-        try:
-            address(law)
-        except Exception as error:  # noqa: BLE001 - numba raises anything for what it cannot compile
-            lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-            told = next(
-                (line for line in lines if "error" not in line.lower() or len(lines) == 1),
-                lines[0] if lines else "",
-            )
-            faults.append(f"its law {law.__name__} ({kind.name}) cannot be compiled: {told[:200]}")
     return faults
 
 

@@ -1,5 +1,6 @@
 """An effect of the user's own is used like one of the library, and told what it owes."""
 
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -158,6 +159,40 @@ def test_the_check_passes_what_is_right(own: Path, capsys: pytest.CaptureFixture
 )
 def test_the_check_says_what_is_broken(own: Path, changes: list[tuple[str, str]], told: str) -> None:
     assert told in check(own, *changes)
+    assert "own_pull" not in LIBRARY
+
+
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        (
+            [("EFFECT =", 'TABLE = {"a": 1.0}\n\n\nEFFECT ='), ("return p[0]", 'return p[0] * TABLE["a"]')],
+            "its law pull (BODY) cannot be compiled",
+        ),
+        (
+            [("null=0.0, lower=-10.0", 'null=float("inf"), lower=0.0'), ("typical=1.0", "typical=0.0")],
+            "pull_n: it vanishes at infinity, so its typical 0 has to be above 0",
+        ),
+        (
+            [
+                ("Kind.BODY,", "Kind.BETWEEN_SHOTS,"),
+                ("laws={LawKind.BODY: pull}", "between=lambda parameters, shots: shots.oil"),
+            ],
+            "its between= cannot be evaluated: AttributeError",
+        ),
+    ],
+)
+def test_a_run_begins_with_effects_that_can_be_used(
+    own: Path, changes: list[tuple[str, str]], told: str
+) -> None:
+    """One that could not be compiled was offered, and ended the run with a traceback minutes later."""
+    text = OWN
+    for before, after in changes:
+        assert before in text
+        text = text.replace(before, after)
+    own.write_text(text, encoding="utf-8")
+    with pytest.raises(EffectError, match=re.escape(f"own_pull.py: {told}")):
+        run_verb(["discrepancy", "nowhere", "-o", str(own.parent / "out"), "--effects", str(own)])
     assert "own_pull" not in LIBRARY
 
 
