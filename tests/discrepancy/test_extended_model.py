@@ -8,6 +8,7 @@ import pytest
 
 from impactcell import campaign as campaigns
 from impactcell.api.extended_model import write_extended_model
+from impactcell.api.finding_files import write_files
 from impactcell.campaign import Campaign
 from impactcell.cli.accept_model import accept_model
 from impactcell.cli.discrepancy import discrepancy
@@ -74,3 +75,21 @@ def test_a_driven_record_leaves_the_contact_of_a_plant_as_it_was(tmp_path: Path)
     assert extended.prior.stiffness_std_n_per_m == nominal.prior.stiffness_std_n_per_m
     assert extended.plant.mu_k != nominal.plant.mu_k
     assert extended.prior.ratio_std != nominal.prior.ratio_std
+
+
+def test_a_run_takes_nothing_away_that_an_earlier_one_or_somebody_has_put_there(tmp_path: Path) -> None:
+    """A law was deleted by the run whose model names it, and with it a report that was kept by hand."""
+    output = tmp_path / "found"
+    output.mkdir()
+    kept = ("law_of_drag_over_speed_01234567.py", "report.2024-05.html", "notes.txt")
+    for name in (*kept, "report.html"):
+        (output / name).write_text("of before", encoding="utf-8")
+
+    def write(beside: Path) -> None:
+        for name in ("result.json", "model.extended.yaml", "report.html", "report.de.html", "law_of_it.py"):
+            (beside / name).write_text("of now", encoding="utf-8")
+
+    write_files(output, write)
+    texts = {file.name: file.read_text(encoding="utf-8") for file in output.iterdir()}
+    assert {name for name, text in texts.items() if text == "of before"} == set(kept)
+    assert len(texts) == len(kept) + 5

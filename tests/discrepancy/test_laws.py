@@ -62,7 +62,6 @@ def test_a_law_that_merely_contains_it_is_no_equivalent(found: DiscrepancyResult
 
 def test_result_report_and_effect_file_say_the_same(found: DiscrepancyResult, tmp_path: Path) -> None:
     data = _dragged()
-    (tmp_path / "law_of_old_00000000.py").write_text("stale")
     write_findings(found, data, tmp_path, "a campaign")
     outcome = json.loads((tmp_path / "result.json").read_text())
     law = outcome["law"]
