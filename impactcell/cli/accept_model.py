@@ -12,6 +12,7 @@ from impactcell.cell import in_place_of
 from impactcell.cli.calibrate import calibrated_model
 from impactcell.cli.own_taps import OwnTaps, compare_on_own_taps
 from impactcell.cli.paths import check_output
+from impactcell.cli.shared_model import cells_sharing, note_sharing
 from impactcell.errors import ImpactCellError, PredictionError, SettingsError
 from impactcell.physics.law_table import NOMINAL_PARAMETERS
 from impactcell.prediction import Model
@@ -41,6 +42,7 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
     cell_config = read_cell(cell)
     model, own_taps = _judged(cell_config, read_model(extended), anyway=anyway)
     is_new = in_place_of(cell_config.model, model) != cell_config.model
+    sharing = cells_sharing(cell_config)
     previous = put_into_service(cell_config, model)
     for finding in judge_cell(read_cell(cell)):
         if finding.is_fault:
@@ -50,6 +52,7 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
             "cell": cell_config.name,
             "model": model.name,
             "previous": str(previous),
+            "shared_with": list(sharing),
             "own_taps": None if own_taps is None else own_taps.content,
         },
         f"{cell_config.name} runs with model {model.name} "
@@ -79,7 +82,8 @@ def _judged(config: CellConfig, extended: Model, *, anyway: bool) -> tuple[Model
 def put_into_service(config: CellConfig, model: Model) -> Path:
     """Write a model in the place of the cell's own, and return where that is kept from now on.
 
-    Where it is the cell's own already nothing is written: the way back to the one before stays open.
+    Where it is the cell's own already nothing is written: the way back to the one before stays open. Other
+    cells that run with the same file are told.
 
     Raises
     ------
@@ -91,6 +95,7 @@ def put_into_service(config: CellConfig, model: Model) -> Path:
     if taking == config.model:
         return previous
     _replace(target, taking, previous)
+    note_sharing(config, taking, cells_sharing(config))
     return previous
 
 
@@ -139,6 +144,7 @@ def restore_model(cell: Path, *, as_json: bool = False) -> None:
         raise SettingsError(f"{previous}: there is none; nothing has been accepted in this cell")
     model = read_model(previous)
     _replace(target, model, previous)
+    note_sharing(cell_config, model, cells_sharing(cell_config))
     if model.is_provisional:
         print_note(
             f"{model.name} is the guess that `impactcell model fit` replaced: nothing of it was measured; "
@@ -173,12 +179,18 @@ def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json:
     rows = [f"  {c['parameter']}: {_text(c['before'])} -> {_text(c['after'])}" for c in changes]
     if own_taps is not None:
         rows.append(own_taps.sentence)
+    sharing = cells_sharing(cell_config)
+    if sharing:
+        rows.append(
+            f"{cell_config.settings.model} is the model file of {', '.join(sharing)} too, or has been"
+        )
     _tell(
         {
             "cell": cell_config.name,
             "before": before.name,
             "after": after.name,
             "changes": changes,
+            "shared_with": list(sharing),
             "own_taps": None if own_taps is None else own_taps.content,
             "refused": None if refusal is None else str(refusal),
         },

@@ -70,6 +70,10 @@ STUDY_TEXTS: Texts = {
         "The model is calibrated first. The cell takes it from the next cycle on: wear and alarms stay.",
         "Das Modell wird erst kalibriert. Die Zelle nimmt es ab dem nächsten Zyklus; Gelerntes bleibt.",
     ),
+    "accept_shared": (
+        "Cells that run, or ran, with the same model file, and take this model too:",
+        "Zellen, die mit derselben Modelldatei laufen oder liefen und dieses Modell auch nehmen:",
+    ),
     "accept": ("Accept: put it into service", "Annehmen: in Betrieb nehmen"),
     "restore": ("Undo: put the model from before back", "Rückgängig: das vorige Modell wieder nehmen"),
     "accepting": ("The model is being changed …", "Das Modell wird gewechselt …"),

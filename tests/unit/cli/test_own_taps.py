@@ -17,6 +17,8 @@ from impactcell.cli.app import run_verb
 from impactcell.cli.own_taps import TAPS, OwnTaps, compare_on_own_taps
 from impactcell.errors import PredictionError, SettingsError
 from impactcell.journal.store import Journal
+from impactcell.physics.effects import LIBRARY, withdraw_effect
+from impactcell.physics.outside_effects import offer_effects
 from impactcell.prediction import Model
 from impactcell.settings import read_cell
 from impactcell.settings.model_file import read_model, write_model
@@ -130,6 +132,48 @@ def test_a_dry_run_refuses_what_would_be_refused_and_tells_what_would_change(
     assert told["own_taps"]["gap_after"] > 1.5 * told["own_taps"]["gap_before"]
     assert read_cell(cell).model == before
     assert not previous_model(read_cell(cell).settings.model).exists()
+
+
+def test_whose_model_changes_too_is_told(cell: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Four shipped cells name one model file: what one of them accepted changed all, without a word."""
+    other, before = cell.parent / "other.yaml", read_cell(cell).model
+    write_model(replace(before, name="the same again"), other)
+    twin = cell.parent / "twin.yaml"
+    twin.write_text(cell.read_text().replace("cell: own", "cell: twin"))
+    (cell.parent / "third.yaml").write_text(
+        cell.read_text().replace("cell: own", "cell: third").replace("model.yaml", "other.yaml")
+    )
+    for command in (["accept", str(cell), str(other)], ["restore", str(cell)]):
+        with pytest.raises(SystemExit) as ended:
+            run_verb(["model", *command])
+        assert ended.value.code == 0
+        said = capsys.readouterr().err
+        assert "model.yaml is the model file of twin, prototype too, or has been: " in said
+        assert "third" not in said
+    with pytest.raises(SystemExit):
+        run_verb(["model", "accept", str(cell), str(other), "--dry-run", "--json"])
+    assert json.loads(capsys.readouterr().out)["shared_with"] == ["twin", "prototype"]
+    twin.unlink()
+    provenance = {**before.provenance, "calibrated by": "impactcell 0.1.0, cell own"}
+    write_model(replace(before, provenance=provenance), cell.parent / "model.yaml")
+    with pytest.raises(SystemExit):
+        run_verb(["model", "accept", str(cell), str(other)])
+    assert "model file of" not in capsys.readouterr().err
+
+
+def test_an_effect_file_that_a_model_needs_is_told(cell: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    effect = CONFIG / "effects" / "position_force.py"
+    offer_effects([effect])
+    try:
+        before = read_cell(cell).model
+        typical = {one.name: one.typical for one in LIBRARY["position_force"].parameters}
+        plant = replace(before.plant, effects={"position_force": typical})
+        write_model(replace(before, plant=plant), cell.parent / "other.yaml")
+        with pytest.raises(SystemExit):
+            run_verb(["model", "accept", str(cell), str(cell.parent / "other.yaml"), "--anyway"])
+        assert f"needs {effect.resolve()}: keep that file there" in capsys.readouterr().err
+    finally:
+        withdraw_effect("position_force")
 
 
 def test_a_dry_run_sees_that_the_model_before_could_not_be_kept(cell: Path) -> None:

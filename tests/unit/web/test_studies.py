@@ -164,7 +164,8 @@ async def test_what_speaks_against_the_model_is_told_before_anybody_accepts_it(
         "2.3 times the sensors' noise, 30 estimates are usable; the model before leaves 1 times the sensors' "
         "noise, 30 are"
     )
-    verbs.outcomes["model"] = VerbOutcome(1, json.dumps(CHANGES | {"refused": refused}), (refused,))
+    told = CHANGES | {"refused": refused, "shared_with": ["press-2"]}
+    verbs.outcomes["model"] = VerbOutcome(1, json.dumps(told), (refused,))
     async with page.logged_in(Role.ENGINEER) as client:
         study, _ = await drop(client, "shots.zip", campaign_zip())
         await until(page, study, Stage.CONFIRMING)
@@ -174,6 +175,8 @@ async def test_what_speaks_against_the_model_is_told_before_anybody_accepts_it(
         shown = {code: (await client.get(f"/studies/{study}?lang={code}")).text for code in ("en", "de")}
     assert "the cell&#39;s own taps speak against it" in shown["en"]
     assert "die eigenen Stöße der Zelle sprechen dagegen" in shown["de"]
+    assert "take this model too: press-2" in shown["en"]
+    assert "dieses Modell auch nehmen: press-2" in shown["de"]
     assert "Missing: viscous friction." in shown["en"]
 
 
