@@ -14,6 +14,7 @@ from impactcell.api.machine_findings import investigate_with_base, write_machine
 from impactcell.campaign import Campaign, naming, read
 from impactcell.cli.paths import check_directory, note_damage, open_journal
 from impactcell.cli.recorded_taps import campaign_of_taps
+from impactcell.discrepancy.data import CellLimits
 from impactcell.discrepancy.report import headline, machine_headline
 from impactcell.discrepancy.search import Mapper
 from impactcell.discrepancy.workflow import investigate
@@ -23,6 +24,7 @@ from impactcell.prediction import Model
 from impactcell.process.console import print_note, print_result
 from impactcell.process.extras import how_to_install
 from impactcell.process.progress import named_steps
+from impactcell.records import MM_PER_MIN
 from impactcell.settings import CellConfig, read_cell
 
 
@@ -74,7 +76,9 @@ def discrepancy(
     source, data = _read(campaign, journal, plant, config)
     with named_steps() as report_step, _mapper(scheduler) as mapper:
         with naming(campaign or journal):
-            result = investigate(data, seed=seed, mapper=mapper, plant=plant, progress=report_step)
+            result = investigate(
+                data, seed=seed, mapper=mapper, plant=plant, limits=_limits(config), progress=report_step
+            )
         report_step("writing the report")
         write_findings(result, data, output, source, model)
     _print_outcome(output, headline(result), as_json=as_json)
@@ -143,6 +147,18 @@ def _read(
             "that recorded these taps, --cell CELL.yaml: it states `actuator.stroke_mm`"
         )
     return str(journal.name), data
+
+
+def _limits(config: CellConfig | None) -> CellLimits:
+    """Tell what the cell can strike: no next experiment goes beyond it."""
+    if config is None:
+        return CellLimits()
+    actuator, mass_kg = config.settings.actuator, config.settings.part.mass_kg
+    return CellLimits(
+        max_velocity_m_s=actuator.max_velocity_mm_per_min * MM_PER_MIN,
+        both_ends=actuator.both_ends,
+        mass_kg=math.nan if mass_kg is None else mass_kg,
+    )
 
 
 def _recording_model(journal: Path) -> Model | None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.data import (
+    CellLimits,
     IndexArray,
     NoiseFloor,
     PreparedCampaign,
@@ -30,6 +31,7 @@ from impactcell.discrepancy.open_records import find_basis
 from impactcell.discrepancy.search import (
     MAX_P_VALUE,
     UNKNOWN,
+    UNLIMITED,
     Conclusion,
     GapMeasure,
     HeldOutOutcome,
@@ -137,6 +139,7 @@ def investigate(
     mapper: Mapper | None = None,
     plant: Plant | None = None,
     library: Sequence[str] | None = None,
+    limits: CellLimits = UNLIMITED,
     progress: Callable[[str], None] | None = None,
 ) -> DiscrepancyResult:
     """Find where model and measurement disagree, name what is missing, add it and prove the gap shrinks.
@@ -152,6 +155,8 @@ def investigate(
         Nominal plant to start from; its effects stay in the model. Without it (1)-(3) with Coulomb friction.
     library : sequence of str, optional
         Effects that may be named; all of them without it.
+    limits : CellLimits
+        Of the cell in which a next experiment would be made.
     progress : callable, optional
         Called with the name of each step as it begins.
 
@@ -237,7 +242,7 @@ def investigate(
         validation=outcome.validation,
         simulation=simulate_held_out(held_problem, nominal, final),
         unexplained=describe_gap(problem, selection.nominal) if conclusion.verdict == UNKNOWN else None,
-        experiments=propose_experiments(problem, final, tied),
+        experiments=propose_experiments(problem, final, tied, prepared.batches, limits),
         law=law,
         plant=plant,
         seed=seed,

@@ -8,6 +8,7 @@ from urllib.parse import unquote, urlparse
 
 import pytest
 
+from impactcell.discrepancy.model import ParameterEstimate
 from impactcell.discrepancy.report import figures, sentences
 from impactcell.discrepancy.report.page import (
     format_number,
@@ -120,6 +121,15 @@ def test_the_first_screen_says_what_it_means_and_what_to_do(
         assert effect["look_at"] in first_screen
     assert "impactcell model accept CELL.yaml model.extended.yaml" in first_screen
     assert "weigh the part" in first_screen
+
+
+def test_batches_are_told_by_name_and_in_order(tied: DiscrepancyResult) -> None:
+    shift = ParameterEstimate("batch_shift", "relative_change", 1, 0.05, 0.04, 0.06, at_bound=False)
+    found = replace(tied, prepared=replace(tied.prepared, batches=("9", "7")), stated_parameters=(shift,))
+    for language, batch in (("en", "batch"), ("de", "Charge")):
+        (row,) = page_context(found, "a campaign", language)["parameters"]
+        assert row["name"].endswith(f"[{batch} 7]")
+    assert result_document(found)["batches"] == ["9", "7"]
 
 
 def test_noise_alone_is_drawn_thin(tied: DiscrepancyResult, monkeypatch: pytest.MonkeyPatch) -> None:

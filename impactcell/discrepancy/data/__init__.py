@@ -5,6 +5,7 @@ from impactcell.discrepancy.data.campaign_checks import (
     refuse_rotation,
     without_unlike_shots,
 )
+from impactcell.discrepancy.data.cell_limits import CellLimits
 from impactcell.discrepancy.data.excitation import MIN_HELD_OUT, MIN_TRAINING, ExcitationStrategy
 from impactcell.discrepancy.data.free_slide import FreeSlide
 from impactcell.discrepancy.data.noise_floor import (
@@ -41,6 +42,7 @@ __all__ = [
     "MIN_TRAINING",
     "PHASES",
     "POSITION",
+    "CellLimits",
     "ExcitationStrategy",
     "FreeSlide",
     "IndexArray",

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.stats import rankdata
 
 from impactcell.campaign import Campaign, Excitation
+from impactcell.discrepancy.data.cell_limits import CellLimits
 from impactcell.discrepancy.data.phases import Trajectory
 from impactcell.discrepancy.data.prepared_shots import IndexArray, PreparedShot, ShotSet
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio
@@ -161,9 +162,14 @@ class ExcitationStrategy(ABC):
         """Mean squared residual of a set of shots from that of every shot."""
         return float(np.average(misfit_per_sample, weights=sizes))
 
-    def settings_within_reach(self, shots: Sequence[PreparedShot]) -> list[tuple[str, PreparedShot]]:
-        """List settings that a next experiment could take, in words and as a shot; none by default."""
-        del shots
+    def settings_within_reach(
+        self, shots: Sequence[PreparedShot], masses_kg: Samples, batches: Sequence[str], limits: CellLimits
+    ) -> list[tuple[str, PreparedShot]]:
+        """List settings that a next experiment could take, in words and as a shot; none by default.
+
+        Masses are those of the shots, fitted where they are not stated; batches are named in order.
+        """
+        del shots, masses_kg, batches, limits
         return []
 
 

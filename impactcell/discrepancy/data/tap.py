@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from impactcell.campaign import Excitation
+from impactcell.discrepancy.data.cell_limits import CellLimits
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.phases import FREE_SLIDE, LOADING, PRELOAD, STOP, UNLOADING, Trajectory
 from impactcell.discrepancy.data.plant_guesses import contact_by_regression, friction_of_slides
@@ -164,15 +165,18 @@ class Tap(ExcitationStrategy):
         phase[~moving & (trajectory.part_displacement_m <= 1e-12)] = PRELOAD
         return phase
 
-    def settings_within_reach(self, shots: Sequence[PreparedShot]) -> list[tuple[str, PreparedShot]]:
+    def settings_within_reach(
+        self, shots: Sequence[PreparedShot], masses_kg: Samples, batches: Sequence[str], limits: CellLimits
+    ) -> list[tuple[str, PreparedShot]]:
         """Velocities, masses, directions, dwells and batches: what was done, and one step beyond it."""
         typical = sorted(shots, key=lambda shot: (shot.velocity_m_s, shot.record))[len(shots) // 2]
         velocities = sorted({shot.velocity_m_s for shot in shots})
-        masses = sorted({shot.mass_kg for shot in shots if math.isfinite(shot.mass_kg)}) or [1.0]
+        directions = {shot.direction for shot in shots} | ({1, -1} if limits.both_ends else set())
         settings = []
-        for velocity in (velocities[0] * SLOWER, velocities[0], velocities[-1], velocities[-1] * FASTER):
-            for mass in (masses[0], masses[-1], masses[-1] * HEAVIER):
-                for direction in (1, -1):
+        for wanted in (velocities[0] * SLOWER, velocities[0], velocities[-1], velocities[-1] * FASTER):
+            velocity = min(wanted, limits.max_velocity_m_s)
+            for mass in _masses(shots, masses_kg, limits):
+                for direction in sorted(directions, reverse=True):
                     words = f"{velocity / MM_PER_MIN:.0f} mm/min, {mass:.3g} kg, direction {direction:+d}"
                     shot = replace(
                         typical, velocity_m_s=velocity, mass_kg=mass, direction=direction, group=-1
@@ -187,12 +191,20 @@ class Tap(ExcitationStrategy):
         if last:
             settings += [
                 (
-                    f"batch {batch + 1} again, after the others",
+                    f"batch {batches[batch] or 'without a name'} again, after the others",
                     replace(typical, batch=batch, record=typical.records),
                 )
                 for batch in range(last + 1)
             ]
         return settings
+
+
+def _masses(shots: Sequence[PreparedShot], masses_kg: Samples, limits: CellLimits) -> tuple[float, ...]:
+    """Lightest and heaviest part there was, and a heavier one unless the cell has its part."""
+    stated = sorted({shot.mass_kg for shot in shots if math.isfinite(shot.mass_kg)})
+    given = math.isfinite(limits.mass_kg)
+    known = stated or [limits.mass_kg if given else float(np.median(masses_kg))]
+    return (known[0], known[-1]) if given else (known[0], known[-1], known[-1] * HEAVIER)
 
 
 def _largest_speed(time: Samples, path: Samples, window: int) -> float:

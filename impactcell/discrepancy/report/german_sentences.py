@@ -61,7 +61,6 @@ _SETTINGS: Final = (
      "keine erreichbare Einstellung unterscheidet sie: eines von beiden für sich messen"),
     (r"\bdirection ([+-]\d)", r"Richtung \1"),
     (r"\bafter ([\d.]+) s at rest$", r"nach \1 s Ruhe"),
-    (r"^batch (\d+) again, after the others$", r"Charge \1 noch einmal, nach den anderen"),
 )  # fmt: skip
 _SHAPES: Final = (
     (r"^the friction factors change .*",
@@ -85,8 +84,16 @@ def label(english: str) -> str:
 
 
 def setting(english: str) -> str:
-    """Say a setting of the next experiment."""
-    return in_german(english, _SETTINGS)
+    """Say a setting of the next experiment; the name of a batch is as it is.
+
+    >>> setting("batch 7.5 again, after the others")
+    'Charge 7.5 noch einmal, nach den anderen'
+    """
+    batch = re.fullmatch(r"batch (.+) again, after the others", english)
+    if batch is None:
+        return in_german(english, _SETTINGS)
+    name = "ohne Namen" if batch[1] == "without a name" else batch[1]
+    return f"Charge {name} noch einmal, nach den anderen"
 
 
 def shape(english: str) -> str:

@@ -97,6 +97,7 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
     phrase, label = said.phrase, said.label
     search = result.selection
     extended = result.final is not result.nominal
+    names = [name or "–" for name in result.prepared.batches]
     return {
         "source": source,
         "verdict": result.verdict,
@@ -143,7 +144,7 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
         "parameters": [
             {
                 "effect": phrase(item.effect) if item.effect else label("nominal plant"),
-                "name": words + (f" [{phrase('batch')} {item.batch + 1}]" if item.batch else ""),
+                "name": f"{words} [{phrase('batch')} {names[item.batch]}]" if item.batch else words,
                 "value": item.value,
                 "low": item.low,
                 "high": item.high,

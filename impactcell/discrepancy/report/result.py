@@ -85,6 +85,7 @@ def result_document(result: DiscrepancyResult) -> dict[str, Any]:
             "replicate_spread": round_digits(result.replicates.spread),
             "friction_spread": round_digits(result.final.spread),
         },
+        "batches": list(result.prepared.batches),
         "notes": [*result.prepared.notes, *result.floor.notes],
         "seed": result.seed,
         "model": "model.extended.yaml",

@@ -29,7 +29,7 @@ from impactcell.discrepancy.search.conclusion import (
 from impactcell.discrepancy.search.confirmation import NestedModels
 from impactcell.discrepancy.search.context import Mapper, SearchContext
 from impactcell.discrepancy.search.evidence import ALPHA, CandidateScan, ModelEvidence, scan_candidates
-from impactcell.discrepancy.search.experiment_design import Proposal, propose_experiments
+from impactcell.discrepancy.search.experiment_design import UNLIMITED, Proposal, propose_experiments
 from impactcell.discrepancy.search.gap import Gap, Part
 from impactcell.discrepancy.search.gap_measure import (
     MAX_EXPECTED_GAP,
@@ -66,6 +66,7 @@ __all__ = [
     "POLICY",
     "TIED",
     "UNKNOWN",
+    "UNLIMITED",
     "UNTESTED",
     "CandidateFit",
     "CandidateScan",

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import norm
 
-from impactcell.discrepancy.data import PreparedShot, ShotSet, concatenate_shots
+from impactcell.discrepancy.data import CellLimits, PreparedShot, ShotSet, concatenate_shots
 from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
 from impactcell.errors import PhysicsError
 from impactcell.physics import Kind
@@ -30,6 +30,8 @@ MAX_SIMULATED_SETTINGS = 3
 """Settings, the cheapest first, that are simulated until one keeps what it promises."""
 SIMULATION = 9
 """Stream of random numbers of these shots, apart from those of other draws."""
+UNLIMITED = CellLimits()
+"""Limits of a cell of which nothing is known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +56,11 @@ class Proposal:
 
 
 def propose_experiments(
-    problem: Problem, best: Fit, rivals: Sequence[tuple[str, str, Fit]]
+    problem: Problem,
+    best: Fit,
+    rivals: Sequence[tuple[str, str, Fit]],
+    batches: Sequence[str],
+    limits: CellLimits = UNLIMITED,
 ) -> tuple[Proposal, ...]:
     """For each tie the cheapest setting that breaks it.
 
@@ -63,16 +69,28 @@ def propose_experiments(
     problem : Problem
     best : Fit
     rivals : sequence of (effect, rival effect, fit of the rival's model)
+    batches : sequence of str
+        Names of the batches, in order of appearance.
+    limits : CellLimits
+        Of the cell in which the shots would be made.
     """
-    experiments = []
-    for effect, rival, fit in rivals:
-        experiments.append(_cheapest_experiment(problem, best, fit, effect, rival))
-    return tuple(experiments)
+    settings = problem.shots.excitation.settings_within_reach(
+        problem.shots.items, best.shot_parameters.mass_kg, batches, limits
+    )
+    return tuple(
+        _cheapest_experiment(problem, best, fit, settings, (effect, rival)) for effect, rival, fit in rivals
+    )
 
 
-def _cheapest_experiment(problem: Problem, best: Fit, rival_fit: Fit, effect: str, rival: str) -> Proposal:
+def _cheapest_experiment(
+    problem: Problem,
+    best: Fit,
+    rival_fit: Fit,
+    settings: Sequence[tuple[str, PreparedShot]],
+    effects: tuple[str, str],
+) -> Proposal:
     feasible: list[tuple[int, str, PreparedShot]] = []
-    for setting, shot in problem.shots.excitation.settings_within_reach(problem.shots.items):
+    for setting, shot in settings:
         separation = _separation(problem, best, rival_fit, shot)
         count = _shots_needed(math.sqrt(max(separation, 0.0)))
         if count <= MAX_SHOTS:
@@ -82,8 +100,8 @@ def _cheapest_experiment(problem: Problem, best: Fit, rival_fit: Fit, effect: st
         count = _shots_needed(per_shot)
         if count <= MAX_SHOTS:
             power = float(norm.cdf(math.sqrt(count) * per_shot - norm.ppf(1.0 - SIGNIFICANCE)))
-            return Proposal((effect, rival), setting, count, power)
-    return Proposal((effect, rival), _separate_measurement(effect, rival), 0, 1.0)
+            return Proposal(effects, setting, count, power)
+    return Proposal(effects, _separate_measurement(*effects), 0, 1.0)
 
 
 def _shots_needed(per_shot: float) -> int:
