@@ -13,8 +13,11 @@ from impactcell.discrepancy.data import driven_blocks, measured_drive, prepare, 
 from impactcell.discrepancy.data.measured_drive import SmoothedDrive, position_response, smooth_drive
 from impactcell.discrepancy.data.noise_at_rest import NoiseAtRest, noise_at_rest, std_of_pieces
 from impactcell.discrepancy.data.noise_floor import sensor_noise
+from impactcell.discrepancy.data.prepared_shots import MOTION_COVARIATES
 from impactcell.discrepancy.data.tap import Tap
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio, check_units
+from impactcell.discrepancy.laws.law import COVARIATE_WORDS
+from impactcell.discrepancy.report import german_sentences
 from impactcell.errors import CampaignError
 from impactcell.records import Capture
 from tests.discrepancy.study import Job, campaign, name_effects, quick_campaign
@@ -290,3 +293,17 @@ def test_lone_outliers_are_no_missing_effect(channel: str, height: float) -> Non
     number = ("force", "position", "actuator").index(channel)
     largest = [np.abs(shot.values[number]).max() for shot in prepared.shots]
     assert largest == pytest.approx([np.abs(shot.values[number]).max() for shot in prepare(made).shots])
+
+
+def test_a_column_takes_no_name_that_the_workflow_has_for_something_else() -> None:
+    """A law over a column `force` was printed as one over the contact force; `mass` replaced the mass."""
+    made = quick_campaign(Job("single", (), 3, shots=12))
+    columns = {"mass": 3.0, "time": 4.0, "force": 5.0, "oil": 20.0}
+    given = replace(made, shots=tuple(replace(shot, covariates=dict(columns)) for shot in made.shots))
+    prepared = prepare(given)
+    assert [shot.covariates["mass"] for shot in prepared.shots] == [shot.mass_kg for shot in made.shots]
+    assert {shot.columns for shot in prepared.shots} == {(("oil", 20.0),)}
+    notes = [note for note in prepared.notes if "is not used" in note]
+    assert [note.split()[1] for note in notes] == ["mass", "time", "force"]
+    assert all("another name" in note and german_sentences.note(note)[0] == "de" for note in notes)
+    assert set(COVARIATE_WORDS) == set(MOTION_COVARIATES)

@@ -19,6 +19,8 @@ from impactcell.discrepancy.data.campaign_checks import (
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.noise_at_rest import NoiseAtRest, noise_at_rest
 from impactcell.discrepancy.data.prepared_shots import (
+    MOTION_COVARIATES,
+    OWN_COVARIATES,
     POSITION,
     IndexArray,
     PreparedShot,
@@ -80,13 +82,13 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     """
     refuse_rotation(campaign)
     strategy = STRATEGIES[campaign.excitation]
-    whole = campaign
+    whole, taken = _without_taken_names(campaign)
     campaign, pretrigger = from_contact(whole)
     data_faults = inspect_campaign(campaign)
     refuse_unusable(campaign, data_faults)
     campaign, unlike = without_unlike_shots(campaign, data_faults)
     whole = replace(whole, shots=tuple(shot for shot in whole.shots if shot.cycle not in unlike))
-    notes = [*pretrigger, *notes_of(data_faults), *notes_of_unlike(unlike)]
+    notes = [*taken, *pretrigger, *notes_of(data_faults), *notes_of_unlike(unlike)]
     campaign = _without_spikes(campaign, notes)
     captures = strategy.cut(campaign, notes)
     if len(captures) < MIN_SHOTS:
@@ -123,6 +125,30 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         noise_at_rest(whole, campaign),
         tuple(notes),
     )
+
+
+def _without_taken_names(campaign: Campaign) -> tuple[Campaign, list[str]]:
+    """Leave out further columns with a name that the workflow itself has for something else, and say so."""
+    taken = {
+        name: None
+        for shot in campaign.shots
+        for name, value in shot.covariates.items()
+        if isinstance(value, float) and name in (*OWN_COVARIATES, *MOTION_COVARIATES)
+    }
+    if not taken:
+        return campaign, []
+    shots = tuple(
+        replace(
+            shot, covariates={name: value for name, value in shot.covariates.items() if name not in taken}
+        )
+        for shot in campaign.shots
+    )
+    notes = [
+        f"Column {name} of shots.csv is not used: the workflow calls something else so; give the column "
+        "another name."
+        for name in taken
+    ]
+    return replace(campaign, shots=shots), notes
 
 
 def _without_spikes(campaign: Campaign, notes: list[str]) -> Campaign:

@@ -18,6 +18,8 @@ FORCE, POSITION, ACTUATOR = range(3)
 
 OWN_COVARIATES = ("shot", "velocity", "mass", "direction", "batch", "dwell", "start", "time", "initial_speed")
 """Covariates that every shot or block has; any other is a further column of `shots.csv`."""
+MOTION_COVARIATES = ("speed", "position", "indentation", "indentation_rate", "gap", "time", "force")
+"""Numbers of the motion that a law may be a function of, by the names that it has for them."""
 
 IndexArray = NDArray[np.int64]
 

@@ -61,6 +61,8 @@ def _left_out(match: re.Match[str]) -> str:
 NOTES: Final[Patterns] = (
     (r"Shot (?P<shot>\d+) is left out: (?P<why>.+?)(?:; for the like so are (?P<others>[\d, ]+))?\.",
      _left_out),
+    (r"Column (\w+) of shots\.csv is not used: .*",
+     r"Spalte \1 in shots.csv bleibt weg: Der Name ist schon vergeben; die Spalte anders nennen."),
     (r"Data, .*", lambda m: german_data_fault(m[0]) or ""),
     (r"The noise of (\w+) is not stated; (\S+ \S+) was .* at rest ([^,]+), (\S+) times .* state (\w+) of .*",
      lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus Messwerten in Ruhe "
