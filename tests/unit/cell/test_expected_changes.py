@@ -96,7 +96,9 @@ def test_the_first_announcement_to_a_module_that_has_started_anew_counts(design,
     """One whose number was the last that had been seen was taken for the one before the start."""
     state = learned
     for cycle in (AT, AT + 1):
-        done = core.step(design, state, capture(cycle, 0.2, "A"), PositioningState(), BatchAnnouncement(1, AT))
+        done = core.step(
+            design, state, capture(cycle, 0.2, "A"), PositioningState(), BatchAnnouncement(1, AT)
+        )
         state = done.state
     assert state.batch.last_announcement == 1
     expected = []
@@ -112,6 +114,8 @@ def test_the_first_announcement_to_a_module_that_has_started_anew_counts(design,
 def test_an_announcement_that_is_still_shown_counts_once(design, learned):
     state = learned
     for cycle in range(AT, AT + 6):
-        done = core.step(design, state, capture(cycle, 0.2, "A"), PositioningState(), BatchAnnouncement(1, AT))
+        done = core.step(
+            design, state, capture(cycle, 0.2, "A"), PositioningState(), BatchAnnouncement(1, AT)
+        )
         state = done.state
     assert state.alarms.suppressed_cycles == design.alarms.announced_cycles - 5

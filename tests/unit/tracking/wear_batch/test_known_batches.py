@@ -1,5 +1,6 @@
 """Batches that are named late, at times, or by another setting: wear goes on, and a batch has its offset."""
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -161,7 +162,7 @@ def test_ids_that_are_not_believed_for_a_while_leave_no_filter_behind():
 )
 def test_a_name_that_comes_with_a_late_cycle_only_begins_nothing(order):
     """Each cycle after the next replay of the first ones was an IndexError."""
-    late = min(n for n, after in zip(order, order[1:], strict=False) if after < n) - 1
+    late = min(n for n, after in itertools.pairwise(order) if after < n) - 1
     readings = [
         FrictionObservation(n, friction(n, math.inf), STD, batch_id="B" if n == late else None)
         for n in [*order, *range(order[-1] + 1, 80)]
