@@ -87,7 +87,14 @@ def drive_noise_std(values: Samples) -> float:
         return white_noise_std(values)
     if is_command(values):
         return 0.0
-    return white_noise_std(values[places]) * math.sqrt(float(np.median(np.diff(places))))
+    return white_noise_std(values[places]) * math.sqrt(samples_held(values))
+
+
+def samples_held(values: Samples) -> float:
+    """Count the samples for which a measured drive is held; 1 for one that is not, and for a command."""
+    if is_command(values) or not len(places := _updates(values)):
+        return 1.0
+    return float(np.median(np.diff(places)))
 
 
 def is_command(values: Samples) -> bool:

@@ -78,11 +78,11 @@ def _interpolated(record: UniformRecord, times: int) -> UniformRecord:
         inner = slice(2 * REACH * times, (len(values) - 1) * times + 1)  # what no end of the record touches
         return np.asarray(upfirdn(low_pass, values, times)[inner], dtype=np.float64)
 
+    # A force between whose samples there are lines shows no noise at high frequencies.
+    is_known = record.noise_is_stated[0], record.noise_is_stated[1] or record.force_span > 1.0
     noise = [
-        stated if is_stated or len(values) < LONG else min(stated, highest_frequency(values)[1])
-        for stated, is_stated, values in zip(
-            record.noise, record.noise_is_stated, (record.position, record.force), strict=True
-        )
+        told if is_told or len(values) < LONG else min(told, highest_frequency(values)[1])
+        for told, is_told, values in zip(record.noise, is_known, (record.position, record.force), strict=True)
     ]
     position, force = between(record.position), between(record.force)
     return replace(

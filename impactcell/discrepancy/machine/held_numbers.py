@@ -175,8 +175,8 @@ def held_numbers(base: BaseModel, sample_s: float) -> tuple[HeldNumber, ...]:
 
 
 def sampling_step_s(records: Iterable[UniformRecord]) -> float:
-    """Longest time between two samples as they were recorded [s]."""
-    return max(record.finer * record.step_s for record in records)
+    """Longest time between two samples of position or force as they were recorded [s]."""
+    return max(record.finer * record.force_span * record.step_s for record in records)
 
 
 def explained_by(search: TermSearch, columns: Sequence[Column], number: HeldNumber) -> Explained | None:

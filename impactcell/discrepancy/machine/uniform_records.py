@@ -10,8 +10,8 @@ from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
 from impactcell.discrepancy.machine.channel_values import cleaned_position, held_mean, without_spikes
 from impactcell.errors import CampaignError
-from impactcell.features import drive_noise_std, is_command, white_noise_std
-from impactcell.records import Capture, Samples
+from impactcell.features import drive_noise_std, is_command, noise_std, samples_held, white_noise_std
+from impactcell.records import Capture, Channel, Samples
 
 MIN_HALF_SUPPORT = 5
 """Least half support of a test function [samples]: fewer do not average the noise of a sensor."""
@@ -37,8 +37,10 @@ class UniformRecord:
     noise_is_stated : tuple of bool
     force_is_command : bool
         Held from its sample to the next, without noise.
+    force_span : float
+        Values that one sample of the force makes, where it is held or sampled more slowly than the position.
     finer : int
-        Samples made of one of the sensors'; noise is then what white noise of the same density has.
+        Samples made of one of the sensors'. Noise is what white noise of the same density has.
     """
 
     shot: int
@@ -52,6 +54,7 @@ class UniformRecord:
     noise: tuple[float, float]
     noise_is_stated: tuple[bool, bool] = (False, False)
     force_is_command: bool = False
+    force_span: float = 1.0
     finer: int = 1
 
     @property
@@ -72,7 +75,8 @@ class UniformRecord:
     @property
     def sensor_noise(self) -> tuple[float, float]:
         """Standard deviation of position and force as the sensors sample them."""
-        return self.noise[0] / math.sqrt(self.finer), self.noise[1] / math.sqrt(self.finer)
+        position, force = self.noise
+        return position / math.sqrt(self.finer), force / math.sqrt(self.finer * self.force_span)
 
 
 def uniform_records(campaign: Campaign, base: BaseModel) -> tuple[UniformRecord, ...]:
@@ -117,12 +121,11 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         # What is switched for a moment is no spike.
         cleaned[1] = (channels[1].values, 0)
         values[1] = held_mean(channels[1].time_s, channels[1].values, time)
-    noise = [
-        channel.noise_std if channel.noise_std is not None else estimate(clean)
-        for channel, (clean, _), estimate in zip(
-            channels, cleaned, (white_noise_std, drive_noise_std), strict=False
-        )
-    ]
+    stated = shot.position.noise_std is not None
+    noise = noise_std(shot.position) if stated else white_noise_std(cleaned[0][0])
+    force_noise, force_span = 0.0, 1.0
+    if shot.force is not None:
+        force_noise, force_span = _force_noise(shot.force, cleaned[1][0], step)
     covariates = {
         name: value
         for name, value in shot.covariates.items()
@@ -138,7 +141,21 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         inertia=inertia,
         covariates=covariates,
         spikes=sum(spikes for _, spikes in cleaned),
-        noise=(noise[0], abs(gain) * noise[1] if len(noise) > 1 else 0.0),
-        noise_is_stated=(channels[0].noise_std is not None, channels[-1].noise_std is not None),
+        noise=(noise, abs(gain) * force_noise),
+        noise_is_stated=(stated, channels[-1].noise_std is not None),
         force_is_command=is_held,
+        force_span=force_span,
     )
+
+
+def _force_noise(force: Channel, clean: Samples, step_s: float) -> tuple[float, float]:
+    """Noise of a force in a record with so small steps, and values of the record that one sample makes.
+
+    On the line between two samples noise has two thirds of a sample's variance in the mean, but its values go
+    together: m of them, of one sample, add up to m times its error, as if each had sqrt(m) times that by
+    itself. Rows average over many. So it is where a force stays the same for m values.
+    """
+    slower = max(float(np.median(np.diff(force.time_s))) / step_s, 1.0)
+    held = samples_held(clean)
+    noise = drive_noise_std(clean) if force.noise_std is None else noise_std(force) * math.sqrt(held)
+    return noise * math.sqrt(slower), held * slower
