@@ -101,9 +101,14 @@ def _plateaus(name: str, channel: Channel, shot: int) -> list[DataFault]:
     return data_faults
 
 
+def gaps_in_time(times: Samples) -> NDArray[np.intp]:
+    """Give the places of the samples after which others are missing, by steps over the median one."""
+    steps = np.diff(times)
+    return np.flatnonzero(steps > GAP_FACTOR * np.median(steps))
+
+
 def _gaps(name: str, channel: Channel, shot: int) -> list[DataFault]:
-    steps = np.diff(channel.time_s)
-    gaps = np.flatnonzero(steps > GAP_FACTOR * np.median(steps))
+    steps, gaps = np.diff(channel.time_s), gaps_in_time(channel.time_s)
     if not gaps.size:
         return []
     first = int(gaps[0])

@@ -7,6 +7,9 @@ from dataclasses import dataclass, field
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.laws import Shaped, form_name
 
+PRIOR_REACH = 2.0
+"""Standard deviations of its prior that a nuisance may go: no misfit talks a scale away [1]."""
+
 
 class Response(enum.StrEnum):
     """Which channel the model predicts from the other."""
@@ -26,6 +29,11 @@ class NumberPrior:
     def is_held(self) -> bool:
         """Whether data may not move it."""
         return self.std <= 0.0
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """From where to where data may move it."""
+        return self.value - PRIOR_REACH * self.std, self.value + PRIOR_REACH * self.std
 
 
 @dataclass(frozen=True, slots=True)

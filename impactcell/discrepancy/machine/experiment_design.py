@@ -71,8 +71,9 @@ def with_experiments(fits: MachineFits, finding: MachineFinding) -> MachineFindi
 
 
 def _longest(finding: MachineFinding) -> UniformRecord:
-    """Record with the longest time, of equal ones that with the widest motion."""
-    return max(finding.records, key=lambda record: (record.time_s[-1], np.ptp(record.position)))
+    """Longest time of a record without a gap, of equal ones that with the widest motion."""
+    whole = [record.part(piece.start, piece.stop) for record in finding.records for piece in record.pieces()]
+    return max(whole, key=lambda record: (record.time_s[-1], np.ptp(record.position)))
 
 
 def _changes(finding: MachineFinding, record: UniformRecord) -> list[_Change]:

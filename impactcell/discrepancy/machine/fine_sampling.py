@@ -63,8 +63,9 @@ def finely_sampled(records: Sequence[UniformRecord]) -> tuple[tuple[UniformRecor
     """
     if any(record.force_is_command for record in records):
         return tuple(records), math.inf
-    long = [record for record in records if len(record.position) >= LONG]
-    fastest = max((highest_frequency(record.position)[0] for record in long), default=0.0)
+    without_gaps = [record.position[record.longest_piece] for record in records]
+    long = [position for position in without_gaps if len(position) >= LONG]
+    fastest = max((highest_frequency(position)[0] for position in long), default=0.0)
     if fastest <= 1.0 / COARSE:
         return tuple(records), math.inf
     times = math.ceil(FINE * fastest)
@@ -82,8 +83,14 @@ def _interpolated(record: UniformRecord, times: int) -> UniformRecord:
     is_known = record.noise_is_stated[0], record.noise_is_stated[1] or record.force_span > 1.0
     noise = [
         told if is_told or len(values) < LONG else min(told, highest_frequency(values)[1])
-        for told, is_told, values in zip(record.noise, is_known, (record.position, record.force), strict=True)
+        for told, is_told, values in zip(
+            record.noise,
+            is_known,
+            (record.position[record.longest_piece], record.force[record.longest_piece]),
+            strict=True,
+        )
     ]
+    reach_s = 2 * REACH * record.step_s  # time begins later by half of it
     position, force = between(record.position), between(record.force)
     return replace(
         record,
@@ -92,4 +99,5 @@ def _interpolated(record: UniformRecord, times: int) -> UniformRecord:
         force=force,
         noise=(noise[0] * math.sqrt(times), noise[1] * math.sqrt(times)),
         finer=times,
+        gaps=tuple((low - reach_s, high) for low, high in record.gaps),
     )

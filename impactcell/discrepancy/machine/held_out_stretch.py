@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
+from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.records import Samples
 
 START_SAMPLES = 5
@@ -25,9 +26,26 @@ OFFSET_STEPS, RECORD_STEPS = 2, 5
 The second where each record has one of its own, of the size of friction."""
 
 
+def between_gaps(
+    record: UniformRecord, begin_s: float, end_s: float, least_s: float
+) -> list[tuple[float, float]]:
+    """Cut what is held out of a record at its gaps: what happened meanwhile moves the part, and is not known.
+
+    A model begins anew after each, from a first state of its own; pieces shorter than `least_s` are left out
+    where one is longer, since its first state takes most of them.
+    """
+    if not record.gaps:
+        return [(begin_s, end_s)]
+    times = [record.time_s[piece] for piece in record.pieces()]
+    inside = [time[(time >= begin_s) & (time <= end_s)] for time in times]
+    pieces = [(float(time[0]), float(time[-1])) for time in inside if time.size]
+    long = [(begin, end) for begin, end in pieces if end - begin >= least_s]
+    return long or [max(pieces, key=lambda piece: piece[1] - piece[0])]
+
+
 def first_state(position: Samples, step: float) -> tuple[float, float]:
     """Position and speed at the first sample, by a parabola."""
-    time = step * np.arange(4 * START_SAMPLES + 1)
+    time = step * np.arange(min(4 * START_SAMPLES + 1, len(position)))
     curve = np.polynomial.Polynomial.fit(time, position[: len(time)], 3)
     return float(curve(0.0)), float(curve.deriv()(0.0))
 

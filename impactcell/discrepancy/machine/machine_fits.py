@@ -8,10 +8,11 @@ from typing import Self
 
 import numpy as np
 
-from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, TermChoice
+from impactcell.discrepancy.machine.base_model import PRIOR_REACH, BaseModel, NumberPrior, TermChoice
 from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, row_weights, weighed
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.held_numbers import DELAY, HeldNumber
+from impactcell.discrepancy.machine.held_out_stretch import between_gaps
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.model_forces import friction_at_rest
 from impactcell.discrepancy.machine.motion_scale import motion_scale
@@ -20,7 +21,6 @@ from impactcell.discrepancy.machine.record_constants import without_constants
 from impactcell.discrepancy.machine.regression import (
     BLOCKS_OF_RECORD,
     PIECES_PER_BLOCK,
-    PRIOR_REACH,
     Blocks,
     blocks_of,
     fit_blocks,
@@ -288,12 +288,13 @@ class MachineFits:
         return min(grid, key=loss)
 
     def held_spans(self) -> tuple[tuple[int, float, float], ...]:
-        """Record, begin and end of each stretch of held-out blocks."""
+        """Record, begin and end of each stretch of held-out blocks between the gaps of records."""
         every = self._held_of([int(block) for block in np.unique(self._number(self.rows()))])
         spans = []
         for place, record in enumerate(self.records):
             held = [block for block in every if block // BLOCKS_OF_RECORD == place]
             if held:
                 begin = (held[0] % BLOCKS_OF_RECORD) * self.block_s if self.held is None else 0.0
-                spans.append((place, begin, float(record.time_s[-1])))
+                pieces = between_gaps(record, begin, float(record.time_s[-1]), 0.5 * self.block_s)
+                spans += [(place, *piece) for piece in pieces]
         return tuple(spans)

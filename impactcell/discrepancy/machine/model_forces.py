@@ -8,7 +8,7 @@ import numpy as np
 
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
 from impactcell.discrepancy.machine.law_terms import term_of
-from impactcell.discrepancy.machine.motion_scale import MotionScale, carried_load, half_supports
+from impactcell.discrepancy.machine.motion_scale import MotionScale, carried_load, half_supports, is_told
 from impactcell.discrepancy.machine.smoothing import smoothed_speed, speed_noise
 from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
@@ -56,14 +56,20 @@ def friction_at_rest(model: FittedModel, records: Sequence[UniformRecord], scale
 
 
 def motions(finding: MachineFinding) -> list[MotionState]:
-    """Measured motion of every record, by the final model's gravity; without any column of `shots.csv`."""
+    """Measured motion of every record, by the final model's gravity; without any column of `shots.csv`.
+
+    What lies near a gap is left out.
+    """
     states = []
     for record in finding.records:
         _, narrow = half_supports(record, finding.scale)
         velocity, _ = smoothed_speed(record.position, narrow, record.step_s)
         gravity = finding.final.gravity
         load = carried_load(finding.base.response, record, record.force, (gravity, finding.scale))
-        states.append(MotionState(record.position, velocity, load, np.zeros(velocity.shape)))
+        told = is_told(record, finding.scale)
+        states.append(
+            MotionState(record.position[told], velocity[told], load[told], np.zeros(int(told.sum())))
+        )
     return states
 
 
@@ -77,7 +83,7 @@ def resistance(finding: MachineFinding, model: FittedModel) -> tuple[float, floa
         _, narrow = half_supports(record, finding.scale)
         noise = speed_noise(narrow, record.step_s) * record.noise[0]
         moving = np.abs(direction_of_motion(motion.velocity, finding.scale, noise)) == 1.0
-        against = np.zeros(record.position.shape)
+        against = np.zeros(moving.shape)
         for chosen in model.terms:
             term = term_of(chosen.choice)
             column = np.full(moving.shape, record.covariates.get(chosen.choice.covariate, 0.0))

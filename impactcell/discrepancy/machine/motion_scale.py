@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.channel_values import LARGEST
@@ -36,6 +37,11 @@ LEVELLED = 1.02
 """Growth in such a step below which all of the acceleration is resolved [1]."""
 MAX_NOISE_SHARE = 0.1
 """Share of the sensor's noise in the mean square of an acceleration beyond which it says nothing [1]."""
+TOO_MANY_GAPS = (
+    "samples are missing so often that between the gaps nothing is long enough for the equation of motion; "
+    "record without gaps, or a slower motion in more samples"
+)
+"""Where no stretch of a record between its gaps is long enough."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,7 +76,7 @@ def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: 
     Raises
     ------
     CampaignError
-        Nothing moves.
+        Nothing moves, or gaps in time leave nothing of it.
     """
     moving = [record for record in records if np.ptp(record.position) > 0.0]
     if not moving:
@@ -78,8 +84,14 @@ def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: 
     # Coarse speeds, so that quantised positions do not count.
     speeds, places = [], []
     for record in moving:
-        speeds.append(coarse_speed(record.position, 200, record.step_s))
-        places.append(record.position - record.position.mean())
+        speed = coarse_speed(record.position, 200, record.step_s)
+        speed = speed[record.is_whole(after=len(record.position) - len(speed))[: len(speed)]]
+        if speed.size:
+            place = record.position[record.is_whole()]
+            speeds.append(speed)
+            places.append(place - place.mean())
+    if not speeds:
+        raise CampaignError(TOO_MANY_GAPS)
     speed = np.concatenate(speeds)
     period = period_of(np.concatenate(places), speed)
     position = np.concatenate([record.position for record in records])
@@ -90,8 +102,14 @@ def motion_scale(records: Sequence[UniformRecord], response: Response, gravity: 
         float(position.min()),
         float(position.max()),
     )
-    loads = [carried_load(response, record, record.force, (gravity, scale)) for record in records]
-    return replace(scale, load=float(np.quantile(np.concatenate(loads), LARGEST)))
+    loads = [
+        carried_load(response, record, record.force, (gravity, scale))[is_told(record, scale)]
+        for record in records
+    ]
+    load = np.concatenate(loads)
+    if not load.size:
+        raise CampaignError(TOO_MANY_GAPS)
+    return replace(scale, load=float(np.quantile(load, LARGEST)))
 
 
 def coarse_speed(position: Samples, parts: int, step_s: float) -> Samples:
@@ -145,6 +163,9 @@ def _inertial_force(records: Sequence[UniformRecord], period_s: float) -> float 
         second = (
             record.position[2 * span :] - 2.0 * record.position[span:-span] + record.position[: -2 * span]
         )
+        second = second[record.is_whole(span, span)[span:-span]]
+        if not second.size:
+            continue
         # What is left of a spike is a few large ones of them, and the finer the span the larger.
         second = np.minimum(np.abs(second), np.quantile(np.abs(second), LARGEST_ACCELERATION))
         scale = (record.inertia / (span * record.step_s) ** 2) ** 2
@@ -168,6 +189,13 @@ def half_supports(record: UniformRecord, scale: MotionScale) -> tuple[int, int]:
     ):
         narrow += 1
     return half, narrow
+
+
+def is_told(record: UniformRecord, scale: MotionScale) -> NDArray[np.bool_]:
+    """Whether what a row takes from about each sample was measured: no gap is near, shape (n,)."""
+    half, narrow = half_supports(record, scale)
+    reach = half + max(half // 2, 2 * narrow) + 2  # of a test function, and of loads and speeds within it
+    return record.is_whole(reach, reach)
 
 
 def carried_load(

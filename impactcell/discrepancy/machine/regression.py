@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import t as student
 
-from impactcell.discrepancy.machine.base_model import NumberPrior
+from impactcell.discrepancy.machine.base_model import PRIOR_REACH, NumberPrior
 from impactcell.discrepancy.machine.weak_form import Column, IndexArray, Rows
 from impactcell.records import Samples
 
@@ -20,8 +20,6 @@ PIECES_PER_BLOCK = 4.0
 """Independent pieces that a block counts for where a prior is weighed against it [1]."""
 BLOCKS_OF_RECORD = 100_000
 """Numbers of blocks that a record may have: a day of seconds [1]."""
-PRIOR_REACH = 2.0
-"""Standard deviations of its prior that a nuisance may go: no misfit talks a scale away [1]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from impactcell.discrepancy.machine.base_model import Response
+from impactcell.discrepancy.machine.base_model import PRIOR_REACH, Response
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, OpenLoopError
 from impactcell.discrepancy.machine.held_out_stretch import (
     OFFSET_STEPS,
@@ -24,8 +24,7 @@ from impactcell.discrepancy.machine.held_out_stretch import (
     settled_start,
 )
 from impactcell.discrepancy.machine.model_forces import law_of
-from impactcell.discrepancy.machine.motion_scale import MotionScale, carried_load, half_supports
-from impactcell.discrepancy.machine.regression import PRIOR_REACH
+from impactcell.discrepancy.machine.motion_scale import MotionScale, carried_load, half_supports, is_told
 from impactcell.discrepancy.machine.smoothing import averaged, smoothed_acceleration, smoothed_speed
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, direction_of_motion, eccentricity_waves
@@ -78,7 +77,7 @@ def _fit(rmse: float, varying: Samples) -> float:
 
 
 def needed_force(model: FittedModel, record: UniformRecord, stretch: slice, scale: MotionScale) -> Samples:
-    """Force that the measured motion needs, averaged; nan where the part rests or turns."""
+    """Force that the measured motion needs, averaged; nan where the part rests or turns, or a gap is near."""
     half = _half_average(record, scale)
     velocity, noise = smoothed_speed(record.position, half_supports(record, scale)[1], record.step_s)
     acceleration = smoothed_acceleration(record.position, half, record.step_s)
@@ -94,7 +93,7 @@ def needed_force(model: FittedModel, record: UniformRecord, stretch: slice, scal
     beyond, by_zero = _gravity_deviation(model)
     deviation = by_zero * np.cos(record.position) - beyond * np.sin(record.position)
     beside = gravity - smooth - model.nuisance("force_offset") + direction * friction - deviation
-    force = averaged(beside, half, record.step_s)
+    force = np.where(is_told(record, scale), averaged(beside, half, record.step_s), np.nan)
     force += record.inertia * (gain + model.nuisance("inertia")) * acceleration
     eccentricity = _eccentricity(model)
     if eccentricity.any():

@@ -1,20 +1,24 @@
 """Records of a machine at equal steps, without spikes."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from impactcell.campaign import Campaign
-from impactcell.discrepancy.machine.base_model import BaseModel, Response
-from impactcell.discrepancy.machine.channel_values import cleaned_position, held_mean, without_spikes
+from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response
+from impactcell.discrepancy.machine.channel_values import ABOUT, cleaned_position, held_mean, without_spikes
 from impactcell.errors import CampaignError
 from impactcell.features import drive_noise_std, is_command, noise_std, samples_held, white_noise_std
+from impactcell.quality import gaps_in_time
 from impactcell.records import Capture, Channel, Samples
 
 MIN_HALF_SUPPORT = 5
 """Least half support of a test function [samples]: fewer do not average the noise of a sensor."""
+Gaps = tuple[tuple[float, float], ...]
+"""Begin and end of each stretch of time within which samples are missing [s], in their order."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +45,9 @@ class UniformRecord:
         Values that one sample of the force makes, where it is held or sampled more slowly than the position.
     finer : int
         Samples made of one of the sensors'. Noise is what white noise of the same density has.
+    gaps : tuple of (float, float)
+        Time from the last sample before to the first one after which one of the channels has none. Values
+        between are straight lines, and nothing that was measured.
     """
 
     shot: int
@@ -56,6 +63,7 @@ class UniformRecord:
     force_is_command: bool = False
     force_span: float = 1.0
     finer: int = 1
+    gaps: Gaps = ()
 
     @property
     def step_s(self) -> float:
@@ -64,13 +72,39 @@ class UniformRecord:
 
     def part(self, first: int, last: int | None = None) -> "UniformRecord":
         """Take the samples from `first` on, to before `last`; time begins anew."""
-        inside = slice(first, last)
+        inside, begin_s = slice(first, last), float(self.time_s[first])
+        time_s = self.time_s[inside] - begin_s
+        gaps = [(low - begin_s, high - begin_s) for low, high in self.gaps]
         return replace(
             self,
-            time_s=self.time_s[inside] - self.time_s[first],
+            time_s=time_s,
             position=self.position[inside],
             force=self.force[inside],
+            gaps=tuple((low, high) for low, high in gaps if low < time_s[-1] and high > 0.0),
         )
+
+    def is_whole(self, before: int = 0, after: int = 0) -> NDArray[np.bool_]:
+        """Whether each sample, and so many before and after it, lie in no gap, shape (n,)."""
+        size = len(self.time_s)
+        lost = np.zeros(size, dtype=bool)
+        for low, high in self.gaps:
+            lost[np.searchsorted(self.time_s, low, "right") : np.searchsorted(self.time_s, high)] = True
+        count, place = np.concatenate([[0], np.cumsum(lost)]), np.arange(size)
+        whole: NDArray[np.bool_] = (
+            count[np.minimum(place + after + 1, size)] == count[np.maximum(place - before, 0)]
+        )
+        return whole
+
+    def pieces(self) -> list[slice]:
+        """Give the samples between its gaps, piece by piece."""
+        whole = np.concatenate([[False], self.is_whole(), [False]])
+        edges = np.flatnonzero(np.diff(whole)).tolist()
+        return [slice(*piece) for piece in zip(edges[::2], edges[1::2], strict=True)]
+
+    @property
+    def longest_piece(self) -> slice:
+        """Longest of them."""
+        return max(self.pieces(), key=lambda piece: piece.stop - piece.start, default=slice(0, 0))
 
     @property
     def sensor_noise(self) -> tuple[float, float]:
@@ -113,7 +147,10 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         )
     time = begin + step * np.arange(count)
     is_held = len(channels) > 1 and base.response is Response.POSITION and is_command(channels[1].values)
-    cleaned = [cleaned_position(shot.position.values), *(without_spikes(one.values) for one in channels[1:])]
+    cleaned = [
+        _as_it_was_at_gaps(channel, *clean(channel.values))
+        for channel, clean in zip(channels, (cleaned_position, without_spikes), strict=False)
+    ]
     values = [
         np.interp(time, channel.time_s, clean) for channel, (clean, _) in zip(channels, cleaned, strict=True)
     ]
@@ -145,6 +182,7 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         noise_is_stated=(stated, channels[-1].noise_std is not None),
         force_is_command=is_held,
         force_span=force_span,
+        gaps=_gaps(channels, base.delay_s, begin),
     )
 
 
@@ -159,3 +197,30 @@ def _force_noise(force: Channel, clean: Samples, step_s: float) -> tuple[float, 
     held = samples_held(clean)
     noise = drive_noise_std(clean) if force.noise_std is None else noise_std(force) * math.sqrt(held)
     return noise * math.sqrt(slower), held * slower
+
+
+def _as_it_was_at_gaps(channel: Channel, cleaned: Samples, replaced: int) -> tuple[Samples, int]:
+    """Take back what was replaced beside a gap, where a motion that went on looks like an outlier."""
+    gaps = gaps_in_time(channel.time_s)
+    if not gaps.size:
+        return cleaned, replaced
+    for place in gaps + 1:
+        beside = slice(max(place - ABOUT, 0), place + ABOUT)
+        cleaned[beside] = channel.values[beside]
+    return cleaned, int(np.count_nonzero(cleaned != channel.values))
+
+
+def _gaps(channels: Sequence[Channel], delay: NumberPrior, begin_s: float) -> Gaps:
+    """Where position or force have no samples: of the force, however late it may have been recorded."""
+    found = []
+    for channel, (early_s, late_s) in zip(channels, ((0.0, 0.0), delay.reach), strict=False):
+        for place in gaps_in_time(channel.time_s):
+            low, high = channel.time_s[place : place + 2] - begin_s
+            found.append((float(low) - late_s, float(high) - early_s))
+    gaps: list[tuple[float, float]] = []
+    for low, high in sorted(found):
+        if gaps and low <= gaps[-1][1]:
+            gaps[-1] = gaps[-1][0], max(gaps[-1][1], high)
+        else:
+            gaps.append((low, high))
+    return tuple(gaps)

@@ -13,7 +13,13 @@ import numpy as np
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
 from impactcell.discrepancy.machine.law_terms import term_of
-from impactcell.discrepancy.machine.motion_scale import MotionScale, carried_load, half_supports, motion_scale
+from impactcell.discrepancy.machine.motion_scale import (
+    MotionScale,
+    carried_load,
+    half_supports,
+    is_told,
+    motion_scale,
+)
 from impactcell.discrepancy.machine.rival_forms import Basis, free_columns, hats
 from impactcell.discrepancy.machine.smoothing import smoothed_speed, test_function, test_slope
 from impactcell.discrepancy.machine.terms import MotionState, Term
@@ -117,6 +123,7 @@ def _record_rows(
         force = np.interp(record.time_s + delay_s, record.time_s, force)
     load = carried_load(base.response, record, force, (gravity, scale))
     centres: IndexArray = np.arange(half + narrow, len(force) - half - narrow, half, dtype=np.int64)
+    centres = centres[is_told(record, scale)[centres]]
     direction = direction_of_motion(velocity, scale, record.noise[0] * speed_noise)
     resting = _averaged((np.abs(direction) < 1.0).astype(np.float64), weight, centres)
     centres = centres[resting <= MAX_RESTING_SHARE]
