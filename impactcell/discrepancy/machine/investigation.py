@@ -20,6 +20,7 @@ from impactcell.discrepancy.machine.release import from_release
 from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
+from impactcell.discrepancy.machine.whole_turns import without_wraps
 from impactcell.errors import CampaignError
 from impactcell.physics.effect_names import in_words
 from impactcell.quality import Fault, inspect_campaign, notes_of, refuse_unusable
@@ -56,6 +57,7 @@ def investigate_machine(
     CampaignError
         The records cannot be used with the base model; the message says why and what to do.
     """
+    campaign, turned = without_wraps(campaign)
     data_faults = inspect_campaign(campaign)
     if pulls_back(base):  # what swings comes back to where it began, and follows a slow force
         data_faults = tuple(one for one in data_faults if one.fault is not Fault.PRESLIDING_ONLY)
@@ -68,6 +70,7 @@ def investigate_machine(
             "one of them has to change its `coordinate`"
         )
     base, notes = hold_what_cannot_be_seen(base, records)
+    notes = [*turned, *notes]
     if base.gravity_torque.value != 0.0 and not any(record.force.any() for record in records):
         records, said = from_release(records)
         notes += said

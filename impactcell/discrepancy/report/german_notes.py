@@ -131,6 +131,9 @@ NOTES: Final[Patterns] = (
     (r"Each record has a constant force of its own, .*",
      ("Jede Messung hat ihre eigene konstante Kraft, auch die zurückgehaltenen: Abweichungen und Simulation "
       "sind von dem, was sie übrig lässt, mit dem Genannten und ohne es.")),
+    (r"The angle jumps by a whole turn in (\d+) of (\d+) records: .*",
+     (r"Der Winkel springt in \1 von \2 Messungen um eine ganze Umdrehung: Sein Geber beginnt nach jeder von "
+      r"vorn, und der Winkel wurde fortgeführt.")),
     (r"There are ([\d.]+) samples in a period of the fastest motion: .*, (\d+) samples for one\.",
      (r"Auf eine Periode der schnellsten Bewegung kommen \1 Messwerte: Zwischen ihnen gilt sie als Summe von "
       r"Sinuswellen unter der halben Abtastrate, \2 Werte für einen.")),
