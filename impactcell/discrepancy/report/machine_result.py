@@ -20,6 +20,7 @@ from impactcell.discrepancy.report.machine_parameters import SYMBOLS, parameter_
 from impactcell.discrepancy.report.machine_sentences import headline, law_equation
 from impactcell.discrepancy.report.result import FORMAT, SPLINE_ONLY, experiments, round_digits
 from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
+from impactcell.discrepancy.search import MIN_OPEN_GAP
 
 ECCENTRIC_PARTS = ("position_eccentricity_cosine", "position_eccentricity_sine")
 """Names of the two amplitudes of an encoder that turns off its centre."""
@@ -98,8 +99,9 @@ def _remaining(finding: MachineFinding) -> dict[str, Any]:
     }
     if finding.is_at_floor:
         return said
+    is_open = fall.before > MIN_OPEN_GAP
     return said | {
-        "share": round_digits((fall.after - 1.0) / max(fall.before - 1.0, 1e-9)),
+        "share": round_digits(max(fall.after - 1.0, 0.0) / (fall.before - 1.0)) if is_open else 0.0,
         "where": [{"phase": _phase(finding), "depends_on": []}],
         "shots": list(left.shots),
         "share_in_shots": round_digits(left.share),
