@@ -1,6 +1,7 @@
 """Base models: a machine without a cell, in a short YAML, every fault with line and column."""
 
 import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -133,11 +134,10 @@ def read_base_model(path: Path) -> tuple[MachineModel, Excitation]:
         if fault:
             faults.append(yaml_loader.format_error(path, positions.value(("terms", number)), fault))
         choices.append(choice)
-    offset = file.nuisances.force_offset
-    by_record = isinstance(offset, NumberOfRecords) and offset.each is not None
-    if by_record and _prior(offset) != NumberPrior(0.0, math.inf):
-        fault = "what is another one in each record is free: write {std: free, each: record}"
-        faults.append(yaml_loader.format_error(path, positions.value(("nuisances", "force_offset")), fault))
+    faults += [
+        yaml_loader.format_error(path, positions.value(location), fault)
+        for location, fault in _faults_of_numbers(file)
+    ]
     if faults:
         raise SettingsError("\n".join(faults))
     inertia = file.inertia_kg_m2 if file.coordinate == "rotation" else file.mass_kg
@@ -151,7 +151,7 @@ def read_base_model(path: Path) -> tuple[MachineModel, Excitation]:
         position_offset=_prior(nuisances.position_offset),
         position_eccentricity=_prior(nuisances.position_eccentricity),
         force_offset=_prior(nuisances.force_offset),
-        force_offset_by_record=by_record,
+        force_offset_by_record=_is_by_record(nuisances.force_offset),
         force_gain=_prior(nuisances.force_gain),
         delay_s=_prior(nuisances.delay_s),
         block_s=math.nan if file.block_s is None else file.block_s,
@@ -185,6 +185,32 @@ def base_model_text(model: MachineModel, excitation: Excitation, provenance: dic
         mapping["block_s"] = model.block_s
     mapping["provenance"] = provenance
     return HEADER + yaml.safe_dump(mapping, sort_keys=False, allow_unicode=True, width=110)
+
+
+def _is_by_record(offset: float | NumberOfRecords) -> bool:
+    return isinstance(offset, NumberOfRecords) and offset.each is not None
+
+
+def _faults_of_numbers(file: BaseModelFile) -> Iterator[tuple[yaml_loader.Location, str]]:
+    """Say which numbers no machine can have, or no fit can begin with, and where they stand."""
+    for name in ("mass_kg", "inertia_kg_m2"):
+        number: float | UncertainNumber | None = getattr(file, name)
+        if number is None or (prior := _prior(number)).value > 0.0:
+            continue
+        if not prior.is_held:
+            yield (name,), f"{name} needs a value above 0 to begin with: write {{value: ABOUT, std: ...}}"
+        elif prior.value < 0.0 or file.predicts == "position":
+            yield (name,), f"{name} must be above 0; it may be 0 only with predicts: force, and without a std"
+    nuisances = file.nuisances
+    if _is_by_record(nuisances.force_offset) and _prior(nuisances.force_offset) != NumberPrior(std=math.inf):
+        fault = "what is another one in each record is free: write {std: free, each: record}"
+        yield ("nuisances", "force_offset"), fault
+    if math.isinf(_prior(nuisances.delay_s).std):
+        fault = "delay_s is looked for within twice its std, which has to be finite: write {std: SECONDS}"
+        yield ("nuisances", "delay_s"), fault
+    if _prior(nuisances.force_gain).value <= -1.0:
+        fault = "force_gain is relative and above -1: at -1 nothing is left of the force"
+        yield ("nuisances", "force_gain"), fault
 
 
 def _prior(number: float | UncertainNumber) -> NumberPrior:

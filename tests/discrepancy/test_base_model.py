@@ -235,6 +235,21 @@ def test_inertia_that_a_free_motion_cannot_show_is_held_and_said_so(tmp_path: Pa
         (("{value: 0.55, std: free}", "{value: 0.55, std: -1}"), "5:40", "greater than or equal to 0"),
         (("inertia_kg_m2: 0.02", "inertia_kg_m2: heavy"), "4:16", "a valid number"),
         (("force_offset: {std: 0.01}", "force_offset: 0.1"), "1:1", "no force whose force_offset"),
+        (
+            ("kg_m2: 0.02", "kg_m2: {std: free}"),
+            "4:16",
+            "needs a value above 0 to begin with: write {value: ",
+        ),
+        (("kg_m2: 0.02", "kg_m2: {value: 0, std: 0.1}"), "4:16", "needs a value above 0 to begin with"),
+        (
+            ("kg_m2: 0.02", "kg_m2: 0"),
+            "4:16",
+            "inertia_kg_m2 must be above 0; it may be 0 only with predicts",
+        ),
+        (("kg_m2: 0.02", "kg_m2: -2"), "4:16", "must be above 0"),
+        (("nuisances:", "nuisances:\n  delay_s: {std: free}"), "8:12", "finite: write {std: SECONDS}"),
+        (("nuisances:", "nuisances:\n  force_gain: -1"), "8:15", "force_gain is relative and above -1"),
+        (("nuisances:", "nuisances:\n  force_gain: {value: -2, std: free}"), "8:15", "above -1"),
     ],
 )
 def test_faults_of_a_base_model_have_line_and_column(
@@ -244,6 +259,21 @@ def test_faults_of_a_base_model_have_line_and_column(
         base_of(tmp_path, PENDULUM.replace(*changed))
     assert f"base.yaml:{place}: " in str(caught.value)
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("mass", "is_told"), [("0", False), ("0.5", False), ("-1", True), ("{std: 1}", True)]
+)
+def test_a_mass_may_be_nought_only_where_the_force_is_predicted(
+    tmp_path: Path, mass: str, *, is_told: bool
+) -> None:
+    driven = "{format: 1, coordinate: translation, excitation: driven, predicts: %s, mass_kg: %s}"
+    for predicts in ("force", "position"):
+        if is_told or (predicts, mass) == ("position", "0"):
+            with pytest.raises(SettingsError, match=r"base.yaml:1:\d+: mass_kg "):
+                base_of(tmp_path, driven % (predicts, mass))
+        else:
+            assert base_of(tmp_path, driven % (predicts, mass)).inertia == NumberPrior(float(mass))
 
 
 @pytest.mark.parametrize(

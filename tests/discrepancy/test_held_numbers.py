@@ -145,7 +145,11 @@ def test_a_late_force_is_told_and_is_no_law_of_the_speed() -> None:
     assert finding.established == ()
     assert any(note.startswith("A force recorded 6 ms late would explain") for note in finding.notes)
     assert finding.law is None
-    assert "delay_s among the nuisances of the base model would tell" in finding.law_refused
+    way_out = "delay_s: {std: SECONDS} among the nuisances of the base model would tell"
+    assert way_out in finding.law_refused
+    language, said = german_sentences.reason(finding.law_refused)
+    assert language == "de"
+    assert said.endswith("delay_s: {std: SEKUNDEN} unter den nuisances des Grundmodells zeigte es")
 
 
 def test_what_is_left_free_is_not_told_as_held() -> None:

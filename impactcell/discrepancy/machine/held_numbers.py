@@ -127,7 +127,8 @@ def held_numbers(base: BaseModel, sample_s: float) -> tuple[HeldNumber, ...]:
     unit = "N m" if turns else "N"
     numbers = [
         HeldNumber(
-            "delay_s", (DELAY,), "a force recorded late or early", _late_or_early, _nuisance("delay_s"),
+            "delay_s", (DELAY,), "a force recorded late or early", _late_or_early,
+            _nuisance("delay_s: {std: SECONDS}"),
             sample_s,
         ),
         HeldNumber(

@@ -49,8 +49,9 @@ def held_number(english: str) -> str:
 
 def key_of(english: str) -> str:
     """Say where a base model would leave a number free; empty where that is not known."""
-    if match := re.fullmatch(r"(\w+) among the nuisances of the base model", english):
-        return f"{match[1]} unter den nuisances des Grundmodells"
+    if match := re.fullmatch(r"(\w+)(: \{std: SECONDS\})? among the nuisances of the base model", english):
+        within = ": {std: SEKUNDEN}" if match[2] else ""
+        return f"{match[1]}{within} unter den nuisances des Grundmodells"
     match = re.fullmatch(r"a free (\w+) in the base model", english)
     return f"ein freies {match[1]} im Grundmodell" if match else ""
 

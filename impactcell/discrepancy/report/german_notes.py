@@ -195,7 +195,7 @@ REASONS: Final[Patterns] = (
     (r"(an?\w* .+) does as well as any function of speed, load or position",
      lambda m: f"{said} erklärt es so gut wie jede Funktion von Geschwindigkeit, Last oder Ort"
      if (said := held_number(m[1])) else ""),
-    (r"(\w+ among the nuisances of the base model|a free \w+ in the base model) would tell",
+    (r"(\w+[^;]* among the nuisances of the base model|a free \w+ in the base model) would tell",
      lambda m: f"{key_of(m[1])} zeigte es"),
     (r"simulated open loop, the law that fits best errs no less on held-out records than no law",
      "ohne Rückführung simuliert irrt das beste Gesetz an Zurückgehaltenem nicht weniger als keines"),
