@@ -1,14 +1,15 @@
 """Parts of a machine's fits by themselves: what is left, its range, spikes and correlations."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from impactcell.campaign import Coordinate
-from impactcell.discrepancy.machine import channel_values, proof, simulation
+from impactcell.campaign import Campaign, Coordinate, Excitation
+from impactcell.discrepancy.machine import NumberPrior, channel_values, investigation, proof, simulation
 from impactcell.discrepancy.machine import finding as machine_finding
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
 from impactcell.discrepancy.machine.finding import Remainder
@@ -18,6 +19,8 @@ from impactcell.discrepancy.machine.rival_forms import hats
 from impactcell.discrepancy.machine.trials import TermSearch
 from impactcell.discrepancy.machine.weak_form import Rows
 from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
+from impactcell.errors import CampaignError
+from impactcell.records import Capture, Channel
 
 
 def test_range_of_a_gap_where_nothing_is_left_is_students() -> None:
@@ -46,6 +49,45 @@ def test_a_model_is_at_the_floor_where_it_was_fitted_and_where_not(
         fall=SimpleNamespace(after=after), expected=(0.9, 1.1), train_gaps=(3.0, training)
     )
     assert machine_finding.MachineFinding.is_at_floor.fget(found) is expected  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("moving", "pattern", "said"),
+    [
+        (
+            (1, 2, 4, 5),
+            "[36]",
+            r"what is held out \(shots 3, 6\) moves too little for a block of 1 s: hold other",
+        ),
+        (
+            (3, 6),
+            "[36]",
+            r"what is fitted \(shots 1, 2, 4, 5\) moves too little for a block of 1 s: hold other",
+        ),
+        ((), None, r"what is held out \(the last third of each record\) moves too little for a block of 1 s"),
+    ],
+)
+def test_records_that_move_too_little_are_told_from_short_ones(
+    moving: tuple[int, ...], pattern: str | None, said: str
+) -> None:
+    """Records of 10 s were told to be too short for blocks of 1 s."""
+    rng = np.random.default_rng(1)
+    time = np.arange(0.0, 10.0, 5e-3)
+    shots = []
+    for number in range(1, 7):
+        clock = time if number in moving else np.minimum(time, 0.0 if moving else 1.5)
+        channel = Channel(time, 0.01 * np.sin(6.0 * clock) + rng.normal(0.0, 1e-6, time.size), 1e-6)
+        force = Channel(time, np.sin(6.0 * time) + rng.normal(0.0, 1e-3, time.size), 1e-3)
+        shots.append(Capture(number, math.nan, 1.0, force, channel))
+    base = BaseModel(inertia=NumberPrior(1.0), block_s=1.0)
+    with pytest.raises(CampaignError, match=said):
+        investigation.investigate_machine(Campaign(Excitation.DRIVEN, tuple(shots)), base, test=pattern)
+    with pytest.raises(CampaignError, match=r"too short for blocks of 11 s|too short for blocks of 4 s"):
+        investigation.investigate_machine(
+            Campaign(Excitation.DRIVEN, tuple(shots)),
+            replace(base, block_s=11.0 if pattern else 4.0),
+            test=pattern,
+        )
 
 
 def test_spikes_are_taken_out_of_a_signal_far_from_nought() -> None:

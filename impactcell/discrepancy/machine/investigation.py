@@ -132,14 +132,30 @@ def _check_blocks(fits: MachineFits) -> None:
             "faster motion, or state noise_std_m (of a rotation noise_std_rad) in campaign.yaml if it is less"
         )
     training, held_out = fits.blocks()
-    if not (len(training) and len(held_out)):
-        thirds = fits.held is None
+    if len(training) and len(held_out):
+        return
+    thirds, used = fits.held is None, "held out" if len(training) else "fitted"
+    records = [
+        record
+        for place, record in enumerate(fits.records)
+        if fits.held is None or (place in fits.held) is (used == "held out")
+    ]
+    needed_s = fits.block_s * (3.0 if thirds else 1.0)
+    if max(float(record.time_s[-1]) for record in records) >= needed_s:
+        which = "the last third of each record"
+        if not thirds:
+            which = f"shots {', '.join(str(record.shot) for record in records)}"
+        or_gaps = ", or too briefly between gaps in time," if any(record.gaps for record in records) else ""
         raise CampaignError(
-            f"the records are too short for blocks of {fits.block_s:.3g} s"
-            f"{', of which the last third of each is held out' if thirds else ''}: "
-            f"{'hold whole records out (--test), ' if thirds else ''}make them longer, or say a shorter "
-            "`block_s` in the base model"
+            f"what is {used} ({which}) moves too little{or_gaps} for a block of {fits.block_s:.3g} s: hold "
+            f"{'whole' if thirds else 'other'} records out (--test), or record a larger or faster motion"
         )
+    raise CampaignError(
+        f"the records are too short for blocks of {fits.block_s:.3g} s"
+        f"{', of which the last third of each is held out' if thirds else ''}: "
+        f"{'hold whole records out (--test), ' if thirds else ''}make them longer, or say a shorter "
+        "`block_s` in the base model"
+    )
 
 
 def hold_what_cannot_be_seen(
