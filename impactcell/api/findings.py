@@ -93,7 +93,7 @@ def discrepancy(
         Model file whose plant is the nominal one; without it equations (1)-(3) with Coulomb friction, all of
         it fitted.
     seed : int
-        Of the split and of every resampling: the same data and seed give the same findings.
+        Of the split and of every resampling, at least 0: the same data and seed give the same findings.
     base : path, optional
         Base model of a machine that is no cell, in place of `model`.
     train, test : str, optional
@@ -111,6 +111,8 @@ def discrepancy(
     DiscrepancyError
         The nominal model cannot be fitted at all.
     """
+    if seed < 0:
+        raise CampaignError(f"seed is {seed}: a seed is a whole number of at least 0")
     source = None if isinstance(campaign, Campaign) else Path(campaign)
     data = campaign if isinstance(campaign, Campaign) else read(Path(campaign))
     if base is not None:

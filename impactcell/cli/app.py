@@ -185,7 +185,7 @@ def discrepancy(
     *,
     cell: OptionalCell = None,
     journal: Annotated[Path | None, typer.Option(metavar="DB", help="Recorded captures instead.")] = None,
-    seed: Annotated[int, typer.Option(help="Of the resampling.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the resampling.")] = 0,
     scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A dask scheduler.")] = None,
     effects: Annotated[
         list[Path] | None, typer.Option(metavar="PATH", help="A file or folder of effects of your own.")

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import impactcell
 from impactcell import campaign as campaigns
 from impactcell.campaign import Campaign, Excitation, Sensor
 from impactcell.cli.app import app
@@ -100,6 +101,16 @@ def test_what_does_not_go_with_a_base_model_is_refused(tmp_path: Path, besides: 
     refused = CliRunner().invoke(app, given).exception
     assert isinstance(refused, CampaignError)
     assert str(refused) == "--base goes with a campaign, --train, --test and --seed alone"
+
+
+@pytest.mark.parametrize("besides", [[], ["--base", "base.yaml"]])
+def test_a_seed_below_nought_is_refused_before_anything_is_done(tmp_path: Path, besides: list[str]) -> None:
+    given = ["discrepancy", str(tmp_path), "-o", str(tmp_path / "out"), "--seed", "-1", *besides]
+    ran = CliRunner().invoke(app, given)
+    assert ran.exit_code == 2
+    assert "seed" in ran.output
+    with pytest.raises(CampaignError, match="seed is -1: a seed is a whole number of at least 0"):
+        impactcell.discrepancy(tmp_path, seed=-1, base="base.yaml" if besides else None)
 
 
 def test_an_empty_journal_is_said_by_name(tmp_path: Path) -> None:
