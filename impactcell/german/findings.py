@@ -127,11 +127,15 @@ def german_headline(result: Mapping[str, Any]) -> str:
     before, after = (with_decimal_commas(f"{gap[when]:.2f}") for when in ("before", "after"))
     match result["verdict"]:
         case "untested":
-            said = f"Die Messungen reichen für keine Aussage; Abweichung des Modells: {before}."
+            counts = _counts(result)
+            said = f"Die Messungen reichen für keine Aussage{counts}; Abweichung des Modells: {before}."
         case "no_gap":
             said = f"Das Modell erklärt die Messungen: Abweichung {before}."
         case "unknown":
-            said = f"Kein bekannter Effekt erklärt die Abweichung von {before}{_where(result)}."
+            what = f" die Abweichung von {before}"
+            if "what the training shots show and held-out ones do not" in result.get("headline", ""):
+                what = f", was angepasste Messungen zeigen und zurückgehaltene nicht: Abweichung {before}"
+            said = f"Kein bekannter Effekt erklärt{what}{_where(result)}."
             if result.get("unconfirmed"):
                 names = enumerated([*map(german_effect, result["unconfirmed"])], "und")
                 said = f"{names} würde angepasste Messungen erklären, zurückgehaltene bestätigen es nicht."
@@ -149,6 +153,13 @@ def german_headline(result: Mapping[str, Any]) -> str:
         said += f" Ein Gesetz, das keine Bibliothek hat, passt dazu: {german_equation(law['equation'])}."
     said += _follows(result.get("simulation"))
     return f"{said} (Abweichungen an zurückgehaltenen Messungen; 1 ist das Rauschen der Sensoren.)"
+
+
+def _counts(result: Mapping[str, Any]) -> str:
+    """Say how much was fitted and held out, and how much more it takes; only the English headline has it."""
+    told = r"Too few \w+ to say: (\d+) to fit and (\d+) held out, about (\d+) more are needed"
+    counts = re.match(told, result.get("headline", ""))
+    return counts.expand(r": \1 angepasst, \2 zurückgehalten, etwa \3 weitere sind nötig") if counts else ""
 
 
 def _fall(result: Mapping[str, Any], before: str, after: str) -> str:

@@ -107,6 +107,11 @@ def test_notes_on_a_machine_are_said_in_german() -> None:
     beside = "covariate_friction(oil) shows only beside quadratic_drag, which hides it on these records;"
     off = "Simulated open loop, held-out records are 0.2 N m off with it, 0.1 without."
     notes += [f"{alike} not looked for.", f"{beside} quadratic_drag is not named.", off, DRIFTS]
+    notes.append(f"{beside.replace('(oil)', '(oil temp)')} quadratic_drag is not named.")
+    notes.append(
+        "Nothing would remain if mass were off what is told, shot by shot, but so it goes with oil temp "
+        "(correlation +0.87), which no error of a record does."
+    )
     for note in notes:
         assert german_sentences.note(note)[0] == "de", note
 

@@ -3,6 +3,7 @@
 import ast
 import re
 from collections import Counter
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -109,6 +110,22 @@ def test_nothing_is_left_in_english(pages: dict[str, str]) -> None:
         assert word not in german, word
     formulas = "|".join(re.escape(effect.equation) for effect in LIBRARY.values())
     assert re.findall(r"\d\.\d+", re.sub(formulas, "", german)) == []
+
+
+def test_pages_of_driven_records_speak_of_blocks(found: DiscrepancyResult, tmp_path: Path) -> None:
+    blocks = replace(found, prepared=replace(found.prepared, excitation=STRATEGIES[Excitation.DRIVEN]))
+    write_reports(blocks, "a campaign", tmp_path)
+    english, german = ((tmp_path / name).read_text(encoding="utf-8") for name in REPORTS.values())
+    held = len(found.held_out)
+    assert f"{len(found.prepared.shots)} blocks, driven</h1>" in english
+    assert f"{held} blocks never used before" in english
+    assert f"{len(found.prepared.shots)} Blöcke, Anregung: angetrieben" in german
+    assert f"{held} nie zuvor benutzte Blöcke" in german
+    assert "Every block has a friction factor of its own" in english
+    assert "Jeder Block hat einen eigenen Reibungsfaktor" in german
+    for page, word in ((english, r"\bshots?\b"), (german, r"\bSt[oö](ß|ße|ßen)\b")):
+        headings_and_figures = re.findall(r"<(h1|h2|span)[^>]*>(.*?)</\1>", page)
+        assert [text for _, text in headings_and_figures if re.search(word, text)] == []
 
 
 def test_every_parameter_of_the_library_has_german_words_and_its_unit() -> None:

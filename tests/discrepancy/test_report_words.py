@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from impactcell.discrepancy.report import figures, machine_sentences, sentences
+from impactcell.discrepancy.report import figures, german_sentences, machine_sentences, sentences
 from impactcell.discrepancy.search.gap import Gap, Part
 from impactcell.discrepancy.search.gap_measure import GapChange
 from impactcell.german.findings import german_headline
@@ -132,6 +132,48 @@ def test_where_only_the_spread_between_shots_falls_no_gap_is_said_to_fall() -> N
     assert "fällt die Abweichung" not in auf_deutsch
     assert "zwischen Messungen vom 1,55-Fachen auf das 0,98-Fache der von Wiederholungen" in auf_deutsch
     assert "bleibt bei 2,96" in auf_deutsch
+
+
+@pytest.mark.parametrize(("unit", "told"), [("shots", "etwa 4 Stöße mehr"), ("blocks", "etwa 4 Blöcke mehr")])
+def test_what_is_missing_is_counted_in_its_own_unit_and_in_both_languages(unit: str, told: str) -> None:
+    result: Any = SimpleNamespace(
+        conclusion=SimpleNamespace(verdict="untested", missing_shots=4),
+        prepared=SimpleNamespace(excitation=SimpleNamespace(unit=unit)),
+        training=range(7),
+        held_out=range(3),
+        validation=SimpleNamespace(gap_before=2.5),
+    )
+    assert sentences.next_step(result).startswith(f"about 4 {unit} more")
+    assert german_sentences.next_step(result).startswith(told)
+    document = {
+        "verdict": "untested",
+        "headline": sentences._conclusion(result),
+        "gap": {"held_out": {"before": 2.5, "after": 2.5}},
+    }
+    assert "7 to fit and 3 held out, about 4 more" in document["headline"]
+    assert german_headline(document).startswith(
+        "Die Messungen reichen für keine Aussage: 7 angepasst, 3 zurückgehalten, etwa 4 weitere sind nötig; "
+        "Abweichung des Modells: 2,50."
+    )
+
+
+def test_a_gap_of_what_was_fitted_alone_is_told_as_such_in_both_languages() -> None:
+    result: Any = SimpleNamespace(
+        conclusion=SimpleNamespace(verdict="unknown", established=(), unconfirmed=()),
+        validation=SimpleNamespace(gap_before=1.02, is_at_floor=True),
+        selection=SimpleNamespace(outdone=None),
+        unexplained=None,
+    )
+    document = {
+        "verdict": "unknown",
+        "headline": sentences._conclusion(result),
+        "gap": {"held_out": {"before": 1.02, "after": 1.02}},
+    }
+    assert "what the training shots show and held-out ones do not" in document["headline"]
+    assert german_headline(document).startswith(
+        "Kein bekannter Effekt erklärt, was angepasste Messungen zeigen und zurückgehaltene nicht: "
+        "Abweichung 1,02."
+    )
 
 
 def test_an_effect_is_called_as_one_writes_it_and_keeps_its_identifier() -> None:

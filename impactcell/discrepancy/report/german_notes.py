@@ -84,7 +84,7 @@ NOTES: Final[Patterns] = (
      r"from shot to shot, more than the (\S+ %) .*"),
      lambda m: f"{SETTINGS[m[1]]}: nichts bliebe übrig, wenn sie im Mittel um {m[2]}, von Stoß zu Stoß um "
      f"{m[3]} von der Angabe abwiche, mehr als die {m[4]}, die der Messung zugeschrieben werden: prüfen."),
-    ((r"Nothing would remain if (first contact|velocity|mass) .*, but so it goes with (\w+) "
+    ((r"Nothing would remain if (first contact|velocity|mass) .*, but so it goes with (.+?) "
       r"\(correlation (\S+)\), .*"),
      lambda m: f"Nichts bliebe übrig, wenn {DOUBTED[m[1]]} Stoß für Stoß anders wäre als angegeben; doch so "
      f"hängt das mit der Größe „{phrase(m[2])}“ zusammen (Korrelation {m[3]}), und das tut kein Fehler einer "
@@ -152,7 +152,7 @@ NOTES: Final[Patterns] = (
       r"(\S+) without; it is not named\."),
      lambda m: f"{_terms(m[1])}: Zurückgehaltene Blöcke wollen es, aber ohne Rückführung simuliert liegen "
      f"zurückgehaltene Messungen mit ihm um {m[2]} daneben, ohne um {m[3]}; es wird nicht genannt."),
-    (r"(\S+) shows only beside (\S+), which hides it on these records; .*",
+    (r"(.+?) shows only beside (.+), which hides it on these records; .*",
      lambda m: f"{term_name(m[1])} zeigt sich nur neben „{term_name(m[2])}“, das es auf diesen Messungen "
      f"verdeckt; „{term_name(m[2])}“ wird nicht genannt."),
     (r"Every record goes one way: a function of position is one of the time .*",

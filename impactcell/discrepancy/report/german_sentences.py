@@ -156,12 +156,13 @@ def next_step(result: DiscrepancyResult) -> str:
     """Say what to measure where no two effects have to be told apart."""
     conclusion = result.conclusion
     if conclusion.verdict == UNTESTED:
-        return f"etwa {conclusion.missing_shots} Stöße mehr, mit Einstellungen wie diesen"
+        unit = phrase(result.prepared.excitation.unit)
+        return f"etwa {conclusion.missing_shots} {unit} mehr, mit Einstellungen wie diesen"
     if conclusion.remaining.explained:
         return "nichts weiter; ob es so bleibt, zeigt die Abweichung auf der Seite der Zelle"
     place = result.unexplained or next(iter(conclusion.remaining.where), None)
     if place is None:
-        return "dasselbe noch einmal: zurückgehaltene Stöße sagen noch nicht, wo etwas bleibt"
+        return "dasselbe noch einmal: Zurückgehaltenes sagt noch nicht, wo etwas bleibt"
     varied = " und ".join(phrase(name) for name in place.depends_on if name not in NOT_SET)
     what = f"mehr Werte von {varied}, alles andere unverändert" if varied else "dasselbe noch einmal"
     return f"{what}; was bleibt, liegt in der Phase {phrase(place.phase)}"

@@ -21,6 +21,9 @@ WORDS: Final = {
     "start": "Anfangslage",
     "initial_speed": "Anfangsgeschwindigkeit",
     "order": "Reihenfolge",
+    "shots": "Stöße",
+    "blocks": "Blöcke",
+    "block": "Block",
     "stated": "angegeben",
     "estimated": "geschätzt",
 }

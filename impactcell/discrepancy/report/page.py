@@ -108,6 +108,8 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
         "shots": len(result.prepared.shots),
         "training": len(result.training),
         "held_out": len(result.held_out),
+        "units": result.prepared.excitation.unit,
+        "one_unit": result.prepared.excitation.unit.removesuffix("s"),
         "excitation": str(result.prepared.excitation.excitation),
         "notes": [said.note(note) for note in (*result.prepared.notes, *result.floor.notes)],
         "map_before": figures.map_figure(search.nominal, said),
