@@ -9,8 +9,9 @@ def rules() -> str:
     rows = []
     for name, rule in RULES.items():
         chosen = rule.settings
-        is_set = "" if rule.evaluate is None else "off-delay" if rule.is_occurrence else "both"
-        rows.append((code(name), str(chosen.severity), str(chosen.on_delay), str(chosen.off_delay), is_set))
+        is_set = "yes" if rule.evaluate is not None else ""
+        on_delay = "none" if rule.is_occurrence else str(chosen.on_delay)
+        rows.append((code(name), str(chosen.severity), on_delay, str(chosen.off_delay), is_set))
     columns = (
         "condition",
         "severity",
