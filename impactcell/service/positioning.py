@@ -17,6 +17,7 @@ from impactcell.positioning.task_state_machine import TaskOutcome, TaskPhase, Ta
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import Evidence, PositioningState, Quality, Snapshot
 from impactcell.service.factory import positioning_cell, tap_planner
+from impactcell.service.plc_targets import PlcTargets
 from impactcell.service.worker import CellWorker
 from impactcell.settings import CellConfig
 
@@ -66,7 +67,7 @@ class PositioningTask:
         """Of the last tasks, in their order."""
         self._wake = asyncio.Event()
         self._predictions = self._planner.predictions
-        self._plc_target: tuple[int, int] | None = None  # session and sequence of the one looked at last
+        self._plc_targets = PlcTargets()
         self._begun_target: tuple[int, int] | None = None  # session and sequence of the one whose task runs
         self._at_rest = asyncio.Event()  # no tap is under way, also none that was aborted
         self._at_rest.set()
@@ -203,21 +204,20 @@ class PositioningTask:
     async def _read_plc_target(self) -> None:
         """Start a task where the PLC has raised the sequence of its target; a 0 is none, and changes nothing.
 
-        After a restart the module may still show one whose task has ended: nobody wants that again. One that
-        was not over goes on from where the part lies.
+        After a restart, of service or module, there may still be one whose task has ended: nobody wants that
+        again. One that was not over when the service ended goes on from where the part lies.
         """
         block = self._module.status_block
         shown = None if block is None else block.positioning
         if block is None or shown is None or not self._module.status.connected:
             return  # it is still there once the link is up again
         target = (block.session, shown.target_sequence)
-        if target == self._plc_target:
-            return
-        is_first, self._plc_target = self._plc_target is None, target
-        if is_first and block.session and target == self._worker.handled_target:
-            self._log.info("the PLC's target was done with before the restart; it is not begun again")
-        elif shown.target_sequence:
+        is_new, why_not = self._plc_targets.is_new(*target, shown.target_m, self._worker.handled_target)
+        if is_new:
             await self._begin_for_plc(target, shown.target_m)
+        elif why_not:
+            self._log.warning(why_not)
+            self._worker.handled_target = target
 
     async def _begin_for_plc(self, target: tuple[int, int], target_m: float) -> None:
         if self._sequence.running:
@@ -262,7 +262,7 @@ class PositioningTask:
             if report is None:
                 self._set_sequence(task_state_machine.failed(waiting, fault))
                 return
-            if self._plc_target is not None and report.target_sequence not in (0, self._plc_target[1]):
+            if self._plc_targets.is_another(report.target_sequence):
                 # Another part lies there by now: its position says nothing of the tap.
                 self._set_sequence(task_state_machine.aborted(waiting, BY_PLC))
                 return

@@ -68,16 +68,39 @@ async def settled(module: ToldModule, task: PositioningTask) -> None:
     assert outcome.settled
 
 
-@pytest.mark.parametrize(("session", "begins"), [(1, False), (2, True)])
+@pytest.mark.parametrize(
+    ("session", "target_m", "begins"), [(1, 0.02, False), (2, 0.02, True), (2, 0.01, False)]
+)
 async def test_the_first_target_of_a_module_that_was_started_anew_is_a_new_one(
-    module: ToldModule, task: PositioningTask, session: int, begins: bool
+    module: ToldModule, task: PositioningTask, session: int, target_m: float, begins: bool
 ) -> None:
-    """Nothing began, and nothing said why: its number was that of one done with in the session before."""
+    """Nothing began, and nothing said why: its number was that of one done with in the session before.
+
+    The same place under the same number is what a PLC that writes all the time, or a module that keeps its
+    registers, shows without anybody having asked for it: the part may lie anywhere by now.
+    """
     await settled(module, task)
-    module.shown = replace(block(target_m=0.02), session=session)
+    assert task.state.target_m == 0.01
+    module.shown = replace(block(target_m=target_m), session=session)
     await module.read_status()
     await task._read_plc_target()
     assert task.state.running is begins
-    assert task.fault is None
-    if begins:
-        assert task.state.target_m == 0.02
+    if not begins:
+        module.shown = replace(block(target_m=target_m, target_sequence=2), session=session)
+        await module.read_status()
+        await task._read_plc_target()
+        assert task.state.running
+
+
+async def test_a_target_that_a_module_that_was_started_anew_shows_again_is_told(
+    module: ToldModule, task: PositioningTask, caplog: pytest.LogCaptureFixture
+) -> None:
+    await settled(module, task)
+    for sequence in (0, 1, 1):  # until the PLC has written it anew
+        module.shown = replace(block(target_sequence=sequence), session=2)
+        await module.read_status()
+        await task._read_plc_target()
+    assert not task.state.running
+    [told] = [text for text in caplog.messages if "was started anew" in text]
+    assert "until target_sequence is raised" in told
+    assert task._worker.handled_target == (2, 1), "nor after a restart of the service"
