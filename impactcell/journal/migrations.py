@@ -274,15 +274,10 @@ STATE_MIGRATIONS: Final = (
         }
     ),
     Migration(added=_under("snapshot.signature", {"t_squared_limit": math.nan, "spe_limit": math.nan})),
-    Migration(
-        added={
-            "handled_target": None,
-            "cell.tracker.clock.earlier": [],
-            "cell.tracker.expects_change": False,
-        }
-    ),
+    Migration(added={"handled_target": None}),
+    Migration(added={"cell.tracker.clock.earlier": [], "cell.tracker.expects_change": False}),
 )
-"""Of a cell's state: to formats 2 to 11. What earlier planners had not counted is nothing; how a module
+"""Of a cell's state: to formats 2 to 12. What earlier planners had not counted is nothing; how a module
 counted before it last started is not known."""
 ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)
 MODEL_MIGRATIONS: Final = (Migration(_model_2, renamed=_MODEL_2_RENAMED),)

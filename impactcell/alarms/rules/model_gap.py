@@ -53,11 +53,12 @@ def _message_of_taps(predictions: TapPredictions, since: int) -> Message:
     return Message(
         f"The model does not say how far taps move a part: over {predictions.taps} taps since cycle {since} "
         f"what it misses depends on {english} and comes to {percent:+.1f} %. Taps are planned with it, and "
-        "more cautiously; have the taps looked at with `impactcell discrepancy --journal`.",
-        f"Das Modell sagt nicht, wie weit Schläge ein Teil bewegen: über {predictions.taps} Schläge seit "
+        "more cautiously; have the taps looked at with `impactcell discrepancy --journal DB --cell "
+        "CELL.yaml`.",
+        f"Das Modell sagt nicht, wie weit Stöße ein Teil bewegen: über {predictions.taps} Stöße seit "
         f"Zyklus {since} hängt das Fehlende von {german_words} ab und beträgt {german(percent, '+.1f')} %. "
-        "Schläge werden damit und vorsichtiger geplant; Schläge mit `impactcell discrepancy --journal` "
-        "untersuchen lassen.",
+        "Stöße werden damit und vorsichtiger geplant; sie mit `impactcell discrepancy --journal DB --cell "
+        "CELL.yaml` untersuchen lassen.",
     )
 
 
