@@ -74,9 +74,9 @@ async def test_alarms_are_logged_as_they_come_and_every_cycle_where_asked(
 
 async def test_one_sick_cell_leaves_the_other_alone(tmp_path: Path) -> None:
     async with stepped() as module:
-        well = write_cell(tmp_path, module.port, "well")
+        well = write_cell(tmp_path, module.port, "well", module={"window": None})
         absent = write_cell(tmp_path, 1, "absent")
-        stranger = write_cell(tmp_path, module.port, "stranger", module={"device_id": 9})
+        stranger = write_cell(tmp_path, module.port, "stranger", module={"window": None, "device_id": 9})
         async with serving(well, absent, stranger) as watched:
             await watched.connected("well")
             module.strike(5)
