@@ -44,10 +44,16 @@ def write_extended_model(
         write_model(_extended_model(result, data, source, nominal), path)
         return
     shots = str(data.excitation).replace("_", " ")
-    said = (
-        f"no cell can run with it: {shots} shots tell nothing of {_unseen(result)}; name the cell whose "
-        "model is to be extended, `impactcell discrepancy CAMPAIGN --cell CELL.yaml -o DIR`"
-    )
+    if result.per_kilogram:
+        said = (
+            f"no cell can run with it: {', '.join(result.per_kilogram)} is for a part of 1 kg, as no shot "
+            "states its mass; state mass_kg in shots.csv, or name a cell that states part.mass_kg"
+        )
+    else:
+        said = (
+            f"no cell can run with it: {shots} shots tell nothing of {_unseen(result)}; name the cell whose "
+            "model is to be extended, `impactcell discrepancy CAMPAIGN --cell CELL.yaml -o DIR`"
+        )
     plant = {
         **{one.parameter: one.value for one in result.parameters if not one.effect},
         "gravity_m_s2": result.prepared.gravity_m_s2,

@@ -23,7 +23,9 @@ from impactcell.discrepancy.model import (
     usable_blocks,
     with_open_settings,
 )
+from impactcell.errors import CampaignError
 from impactcell.physics import Plant
+from impactcell.physics.free_motion import depends_on_mass
 
 ONSET = "onset_s"
 """First contact, by its name among the shots' own numbers."""
@@ -120,9 +122,13 @@ def nominal_models(
 
     Raises
     ------
+    CampaignError
+        A force of the plant acts on slides whose mass nobody tells.
     DiscrepancyError
         The nominal model cannot be fitted at all.
     """
+    if plant is not None:
+        _refuse_forces_without_mass(prepared, plant)
     problem = problem_of(prepared, floor, training)
     nominal = NominalModel(prepared, floor, training, problem, fit_nominal(problem, plant))
     if prepared.excitation.selects_blocks:
@@ -133,6 +139,15 @@ def nominal_models(
             problem = problem_of(prepared, floor, training)
             nominal = NominalModel(prepared, floor, training, problem, fit_nominal(problem, plant))
     return _with_contact(nominal)
+
+
+def _refuse_forces_without_mass(prepared: PreparedCampaign, plant: Plant) -> None:
+    """Refuse a plant of which a force acts on slides whose mass nobody tells."""
+    if prepared.lacks_mass and (forces := [name for name in plant.effects if depends_on_mass(name)]):
+        raise CampaignError(
+            f"no shot states its mass, which a slide does not show, and {', '.join(forces)} of the nominal "
+            "model is a force: state mass_kg in shots.csv, or part.mass_kg in the cell file"
+        )
 
 
 def _with_contact(nominal: NominalModel) -> NominalModels:

@@ -59,6 +59,7 @@ from impactcell.discrepancy.search import (
 )
 from impactcell.physics import Kind, Plant
 from impactcell.physics.effects import LIBRARY
+from impactcell.physics.free_motion import depends_on_mass
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -127,9 +128,16 @@ class DiscrepancyResult:
         return tuple(name for name in PLANT_PARAMETERS if name not in free)
 
     @property
+    def per_kilogram(self) -> tuple[str, ...]:
+        """Effects of the final model that are known for a part of 1 kg only, as nothing told the mass."""
+        if not self.prepared.lacks_mass:
+            return ()
+        return tuple(name for name in self.final.effects if depends_on_mass(name))
+
+    @property
     def has_whole_plant(self) -> bool:
         """Whether the plant is known as a whole: by the shots, or as it was given."""
-        return self.plant is not None or not self.unseen
+        return not self.per_kilogram and (self.plant is not None or not self.unseen)
 
 
 def investigate(
@@ -163,7 +171,7 @@ def investigate(
     Raises
     ------
     CampaignError
-        The data cannot be used; the message says why and what to do.
+        The data cannot be used, or not with this plant; the message says why and what to do.
     DiscrepancyError
         The nominal model cannot be fitted at all.
     """

@@ -26,18 +26,39 @@ def acts_on_speed(identifier: str) -> bool:
     return not effect.columns and not {LawKind.BODY, LawKind.KINETIC}.isdisjoint(effect.laws)
 
 
+def depends_on_mass(identifier: str) -> bool:
+    """Whether an effect accelerates a light part more than a heavy one: a force does, a tilt does not."""
+    effect = find_effect(identifier)
+    body = effect.laws.get(LawKind.BODY)
+    if body is None:
+        return False
+    typical = np.array([*(one.typical for one in effect.parameters), *([1.0] * len(effect.columns))])
+    masses = np.repeat([1.0, 2.0], 2)
+    rows = np.array([[0.01, speed, mass, 9.81] for mass, speed in zip(masses, (0.1, -0.1) * 2, strict=True)])
+    per_kg = _evaluate(address(body), rows, typical) / masses
+    return not np.allclose(per_kg[:2], per_kg[2:], rtol=1e-9)
+
+
 def model_acceleration(plant: Plant, capture: Capture) -> Callable[[Samples], Samples] | None:
     """Give what a plant's effects do to the free part of a cycle; None where they do nothing.
+
+    Where the mass is not known, forces are left out.
 
     Returns
     -------
     callable or None
         Speeds along the tap, m/s, to `acceleration` along it, m/s².
     """
-    effects = {name: given for name, given in plant.effects.items() if acts_on_speed(name)}
-    if not effects or not capture.mass_kg > 0.0:
+    is_known = capture.mass_kg > 0.0
+    effects = {
+        name: given
+        for name, given in plant.effects.items()
+        if acts_on_speed(name) and (is_known or not depends_on_mass(name))
+    }
+    if not effects:
         return None
-    tap = TapInput(1.0, capture.mass_kg, direction=capture.direction, start_m=capture.start_m)
+    mass_kg = capture.mass_kg if is_known else 1.0
+    tap = TapInput(1.0, mass_kg, direction=capture.direction, start_m=capture.start_m)
     return partial(acceleration, replace(plant, effects=effects), tap)
 
 

@@ -107,6 +107,10 @@ class ExcitationStrategy(ABC):
         del shots
         return []
 
+    def with_unstated_masses(self, shots: list[PreparedShot]) -> list[PreparedShot]:
+        """Shots with a mass where neither they state it nor a fit can find it."""
+        return shots
+
     @abstractmethod
     def unit_ratios(self, shot: PreparedShot, gravity_m_s2: float) -> Mapping[PlausibleRatio, float]:
         """Ratios that are about one unless a column has the wrong unit."""

@@ -1,6 +1,8 @@
 """Free slides: the part moves already when the record begins, and friction alone stops it."""
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,6 +33,21 @@ class FreeSlide(ExcitationStrategy):
     def predicted_channels(self, capture: Capture) -> tuple[Channel | None, Channel | None, Channel | None]:
         """Return the position."""
         return None, capture.position, None
+
+    def missing_information(self, shots: Sequence[PreparedShot]) -> list[str]:
+        """Masses that are not stated, and what takes their place."""
+        unstated = sum(math.isnan(shot.mass_kg) for shot in shots)
+        if not unstated:
+            return []
+        said = f"The mass of {unstated} of {len(shots)} slides is not stated, and a slide does not show it: "
+        if unstated < len(shots):
+            return [said + "the median of the others is taken."]
+        return [said + "forces, as of viscous friction, are told for a part of 1 kg; state mass_kg."]
+
+    def with_unstated_masses(self, shots: list[PreparedShot]) -> list[PreparedShot]:
+        """Give slides that state no mass the median of the others; 1 kg where none does."""
+        masses = self.initial_mass(shots)
+        return [replace(shot, mass_kg=float(mass)) for shot, mass in zip(shots, masses, strict=True)]
 
     def unit_ratios(self, shot: PreparedShot, gravity_m_s2: float) -> Mapping[PlausibleRatio, float]:
         """Deceleration over gravity."""

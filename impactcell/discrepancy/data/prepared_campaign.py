@@ -71,6 +71,12 @@ class PreparedCampaign:
     noise_at_rest: Mapping[str, NoiseAtRest]
     notes: tuple[str, ...]
 
+    @property
+    def lacks_mass(self) -> bool:
+        """Whether no shot states its mass, and none shows it."""
+        stated = [shot.covariates["mass"] for shot in self.shots]
+        return not self.excitation.mass_is_visible and bool(np.isnan(stated).all())
+
 
 def prepare(campaign: Campaign) -> PreparedCampaign:
     """Make a campaign ready for the workflow.
@@ -110,6 +116,7 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     notes += strategy.missing_information(shots)
     notes += _time_gaps(shots)
     check_shot_units(campaign, shots)
+    shots = strategy.with_unstated_masses(shots)
     return PreparedCampaign(
         strategy,
         campaign.gravity_m_s2,

@@ -102,6 +102,11 @@ NOTES: Final[Patterns] = (
      "Nur eine Geschwindigkeit: was von ihr abhängt, ist kaum auseinanderzuhalten."),
     (r"One mass only: .*",
      "Nur eine Masse: Masse und Steifigkeit, Neigung und Rückstellkraft heben sich weniger voneinander ab."),
+    (r"The mass of (\d+) of (\d+) slides is not stated, .* the median of the others is taken\.",
+     r"Die Masse ist bei \1 von \2 Messungen nicht angegeben: Es gilt der Median der anderen."),
+    (r"The mass of \d+ of \d+ slides is not stated, .* for a part of 1 kg; .*",
+     ("Die Masse ist nicht angegeben, und freies Gleiten zeigt sie nicht: Kräfte, wie die viskoser Reibung, "
+      "gelten für ein Teil von 1 kg; mass_kg angeben.")),
     (r"The mass of (\d+) shots is not stated and is fitted\.",
      r"Die Masse ist nicht angegeben und wird angepasst (Stöße: \1)."),
     (r"No replicates: .*",

@@ -165,6 +165,7 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
         "large": LARGE_REGION_RMS,
         "uncertain": TOLD_STDS / math.sqrt(2.0 * max(len(result.held_out), 1)),
         "extended": extended,
+        "per_kilogram": [phrase(item) for item in result.per_kilogram],
         "unseen": []
         if result.has_whole_plant
         else [parameter_words("", name, language)[0] for name in result.unseen],

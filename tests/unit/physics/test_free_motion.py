@@ -6,6 +6,7 @@ import pytest
 from impactcell.physics import Plant, TapInput, free_motion, simulate_free_slide
 from impactcell.physics.effect import LawKind
 from impactcell.physics.effects import LIBRARY
+from impactcell.records import Capture
 
 NOMINAL = (6.5e5, 465.0, 0.2, 0.15)
 
@@ -54,3 +55,31 @@ def test_acceleration_is_the_law_in_python_to_the_bit(identifier: str, direction
     if (kinetic := effect.laws.get(LawKind.KINETIC)) is not None:
         expected -= [g * kinetic(v, 0.0, 0.0, 0.0, flat) for v in speed.tolist()]
     np.testing.assert_array_equal(free_motion.acceleration(plant, tap, speed), expected)
+
+
+@pytest.mark.parametrize("identifier", list(LIBRARY))
+def test_what_depends_on_mass_moves_a_heavy_part_less(identifier: str) -> None:
+    given = {parameter.name: parameter.typical for parameter in LIBRARY[identifier].parameters}
+    plant = Plant(*NOMINAL, effects={identifier: given})
+    depends = free_motion.depends_on_mass(identifier)
+    if not free_motion.acts_on_speed(identifier):
+        assert not depends
+        return
+    taps = [TapInput(1.0, mass_kg, start_m=0.0123) for mass_kg in (5.0, 40.0)]
+    light, heavy = (free_motion.acceleration(plant, tap, np.array([0.2]))[0] for tap in taps)
+    assert (abs(light) > 2.0 * abs(heavy)) == depends
+
+
+def test_an_unknown_mass_leaves_the_tilt_and_no_force() -> None:
+    tilt, viscous = {"tilt_rad": 0.01}, {"viscous_coefficient_n_s_per_m": 60.0}
+    both = Plant(*NOMINAL, effects={"surface_tilt": tilt, "viscous_friction": viscous})
+    one, speed = Plant(*NOMINAL, effects={"surface_tilt": tilt}), np.linspace(0.0, 0.2, 5)
+    unknown = Capture(1, 0.05, float("nan"), None, None)
+    given = free_motion.model_acceleration(both, unknown)
+    assert given is not None
+    expected = free_motion.acceleration(one, TapInput(0.05, 7.0), speed)
+    np.testing.assert_allclose(given(speed), expected, rtol=1e-14)
+    assert (
+        free_motion.model_acceleration(Plant(*NOMINAL, effects={"viscous_friction": viscous}), unknown)
+        is None
+    )
