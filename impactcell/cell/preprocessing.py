@@ -87,8 +87,8 @@ def fill_defaults(defaults: CaptureDefaults, capture: Capture) -> Capture:
         as_recorded(capture, *defaults.recorder_std),
         mass_kg=mass_kg,
         stroke_m=stroke_m,
-        force=_with_noise(capture.force, defaults.force_noise_std_n),
-        position=_with_noise(capture.position, defaults.position_noise_std_m),
+        force=with_noise(capture.force, defaults.force_noise_std_n),
+        position=with_noise(capture.position, defaults.position_noise_std_m),
     )
 
 
@@ -111,7 +111,8 @@ def degrade_quality(friction: FrictionEstimate, faults: tuple[str, ...]) -> Fric
     )
 
 
-def _with_noise(channel: Channel | None, noise_std: float) -> Channel | None:
+def with_noise(channel: Channel | None, noise_std: float) -> Channel | None:
+    """Say how noisy a channel is, unless its module does."""
     return (
         channel if channel is None or channel.noise_std is not None else replace(channel, noise_std=noise_std)
     )

@@ -231,7 +231,7 @@ def export(
     *,
     cell: Annotated[
         Path | None,
-        typer.Option(metavar="CELL.yaml", help="Cell that recorded it: states mass and stroke."),
+        typer.Option(metavar="CELL.yaml", help="Cell that recorded it: states mass, stroke and noise."),
     ] = None,
     first_cycle: Annotated[int | None, typer.Option(help="First cycle to export.")] = None,
     last_cycle: Annotated[int | None, typer.Option(help="Last cycle to export.")] = None,

@@ -49,7 +49,7 @@ def discrepancy(
         Directory for the results; what it holds of an earlier run is replaced only when all is done.
     cell : Path, optional
         Cell whose model is the nominal one, and whose mass free slides have that state none; with `journal`
-        the one that recorded it, which states mass and stroke where its module reports none.
+        the one that recorded it, which states mass, stroke and noise where its module reports none.
     journal : Path, optional
         Journal whose recorded captures are used instead of a campaign.
     seed : int
@@ -139,7 +139,7 @@ def _read(
     if journal is None:
         assert campaign is not None  # noqa: S101 - one of them is given
         return str(campaign.name), _with_mass(read(campaign), config)
-    with open_journal(journal) as store:
+    with open_journal(journal, None if config is None else config.name) as store:
         gravity_m_s2 = plant.gravity_m_s2 if plant else 9.81
         data = campaign_of_taps(journal, store.captures(damaged=note_damage), gravity_m_s2, config)
     if math.isinf(data.stroke_m) and config is None:

@@ -9,19 +9,19 @@ from impactcell.process.console import print_note
 from impactcell.process.path_kind import Kind, kind_at
 
 
-def open_journal(journal: Path) -> Journal:
-    """Open a cell's journal to read it.
+def open_journal(journal: Path, cell: str | None = None) -> Journal:
+    """Open a cell's journal to read it; with the cell's name no other's.
 
     Raises
     ------
     CampaignError
         There is no such file, or nobody may look for it.
     JournalError
-        It is no journal, or one of another version.
+        It is no journal, one of another version, or of another cell.
     """
     if kind_of(journal, CampaignError) is not Kind.FILE:
         raise CampaignError(f"{journal}: there is no such journal; name the `file` of the cell's `journal`")
-    return Journal(journal, None, read_only=True)
+    return Journal(journal, cell, read_only=True)
 
 
 def note_damage(damage: str) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from impactcell.campaign import Campaign
 from impactcell.campaign.recorded_campaign import from_captures
+from impactcell.cell.preprocessing import with_noise
 from impactcell.errors import CampaignError
 from impactcell.process.console import print_note
 from impactcell.records import Capture
@@ -25,7 +26,7 @@ def campaign_of_taps(
     captures : iterable of Capture
     gravity_m_s2 : float
     cell : CellConfig, optional
-        Cell that recorded them: mass and stroke are as it states them where the module reported none.
+        Cell that recorded them: mass, stroke and noise are as it states them where the module reported none.
 
     Raises
     ------
@@ -49,4 +50,11 @@ def _as_stated(cell: CellConfig, capture: Capture) -> Capture:
         capture = replace(capture, mass_kg=mass_kg)
     if stroke_mm is not None and math.isinf(capture.stroke_m):
         capture = replace(capture, stroke_m=1e-3 * stroke_mm)
+    sensors = cell.settings.sensors
+    said = sensors.model_fields_set  # what is not said is a guess, worse than what the samples show
+    if "force_noise_std_n" in said:
+        capture = replace(capture, force=with_noise(capture.force, sensors.force_noise_std_n))
+    if "position_noise_std_um" in said:
+        noise_m = 1e-6 * sensors.position_noise_std_um
+        capture = replace(capture, position=with_noise(capture.position, noise_m))
     return capture

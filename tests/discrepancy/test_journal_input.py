@@ -10,7 +10,7 @@ import pytest
 from impactcell import campaign as campaigns
 from impactcell.cli.discrepancy import discrepancy
 from impactcell.cli.export import export
-from impactcell.errors import CampaignError
+from impactcell.errors import CampaignError, JournalError
 from impactcell.journal.store import Journal
 from impactcell.records import Capture
 from tests.discrepancy.study import write_blank_report
@@ -78,3 +78,52 @@ def test_an_export_has_what_the_cell_states_and_says_what_nobody_does(
     export(journal, tmp_path / "silent")
     assert "did not report its stroke" in capsys.readouterr().err
     assert math.isinf(campaigns.read(tmp_path / "silent").stroke_m)
+
+
+def test_the_noise_that_a_cell_states_counts_and_its_guess_does_not(tmp_path: Path) -> None:
+    """The report said that it was not stated, and estimated it."""
+    captures = (make_capture(1), make_capture(2))
+    quiet = [
+        replace(one, **{name: replace(getattr(one, name), noise_std=None) for name in ("force", "position")})
+        for one in captures
+    ]
+    journal = recorded(tmp_path / "j", tuple(quiet))
+    export(journal, tmp_path / "stated", cell=CELL)
+    sensors = campaigns.read(tmp_path / "stated").sensors
+    assert (sensors["force"].noise_std, sensors["position"].noise_std) == (0.4, pytest.approx(1.5e-6))
+    text = CELL.read_text(encoding="utf-8").replace("../", f"{CELL.parents[1].absolute()}/")
+    for key in ("force_noise_std_n: 0.4", "position_noise_std_um: 1.5"):
+        assert f"  {key}\n" in text
+        text = text.replace(f"  {key}\n", "").replace("sensors:\n", "")
+    (tmp_path / "cell.yaml").write_text(text, encoding="utf-8")
+    export(journal, tmp_path / "silent", cell=tmp_path / "cell.yaml")
+    sensors = campaigns.read(tmp_path / "silent").sensors
+    assert sensors["force"].noise_std is sensors["position"].noise_std is None
+
+
+def test_the_journal_of_another_cell_is_refused(tmp_path: Path) -> None:
+    """Its stroke and mass were taken for those of the cell that was named."""
+    with Journal(tmp_path / "j", "press-1") as journal:
+        journal.append(make_capture(1), make_snapshot(make_capture(1)), b"state")
+    said = "the journal of cell 'press-1', not of 'prototype'"
+    with pytest.raises(JournalError, match=said):
+        export(tmp_path / "j", tmp_path / "campaign", cell=CELL)
+    with pytest.raises(JournalError, match=said):
+        discrepancy(None, tmp_path / "out", journal=tmp_path / "j", cell=CELL)
+    assert not (tmp_path / "campaign").exists()
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "said"),
+    [
+        (3, 1, "--first-cycle 3 is above --last-cycle 1: put them the other way round"),
+        (9, None, "of cycles from 9 there are no samples: the journal has samples of cycles 1 to 2"),
+        (None, 0, "of cycles to 0 there are no samples: the journal has samples of cycles 1 to 2"),
+    ],
+)
+def test_a_range_without_cycles_is_told_which_there_are(
+    tmp_path: Path, first: int | None, last: int | None, said: str
+) -> None:
+    journal = recorded(tmp_path / "j", (make_capture(1), make_capture(2)))
+    with pytest.raises(CampaignError, match=said):
+        export(journal, tmp_path / "campaign", first_cycle=first, last_cycle=last)
