@@ -21,9 +21,9 @@ class Given:
     Attributes
     ----------
     columns : mapping
-        MeasuredColumn of a quantity, as `force`: `Kraft 1`.
+        Name of the column that holds a quantity, as `force`: `Kraft 1`.
     units : mapping
-        MeasuredUnit of a column by its name.
+        Unit of a column, as written, by the column's name.
     signs : mapping
         +1 or -1 for a channel, as `force`: -1.
     excitation : Excitation or None

@@ -5,7 +5,6 @@ request carries, lets any trusted client take over any session, keeps one sessio
 the rest, and limits sessions only by the thousand.
 """
 
-import logging
 import os
 import time
 from collections import deque
@@ -18,8 +17,6 @@ from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.continuation_points import MAX_BROWSE_POINTS, MAX_HISTORY_POINTS, ContinuationPoints
 from impactcell.opcua.host_interface import Actor, ServerLimits
 from impactcell.opcua.tcp_connection import TcpConnection
-
-_log = logging.getLogger(__name__)
 
 MIN_TIMEOUT_S: Final = 10.0
 """Shortest timeout of a session, seconds."""

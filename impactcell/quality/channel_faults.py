@@ -134,10 +134,3 @@ def _goes_on_elsewhere(levels: Samples) -> NDArray[np.bool_]:
     """
     ahead = np.abs(np.diff(levels, append=levels[-1]))
     return ahead > TURN_STEPS * float(np.quantile(ahead[:-1], SMALLEST))
-
-
-def _runs(flags: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Begin and length of each run of true."""
-    edges = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    return starts, ends - starts

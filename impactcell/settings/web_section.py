@@ -25,11 +25,6 @@ class WebSection(Section):
     """Opens plain http beyond loopback, where anybody can listen; every start then warns."""
 
     @property
-    def is_on_loopback(self) -> bool:
-        """Whether only this machine can reach it."""
-        return _is_loopback(self.endpoint)
-
-    @property
     def is_in_the_clear(self) -> bool:
         """Whether passwords cross a network without encryption, to the page or to the proxy before it."""
         addresses = (self.endpoint, self.public_url or self.endpoint)

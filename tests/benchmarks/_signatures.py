@@ -1,13 +1,11 @@
-"""Friction along the stroke: its error, and the speed of the in-cycle filter."""
+"""Friction along the stroke: its error, and its false alarms."""
 
 import math
-import time
 
 import numpy as np
-from filterpy.kalman import KalmanFilter
 
 from impactcell.features import extract
-from impactcell.tracking.signature import in_cycle_filter, tracker
+from impactcell.tracking.signature import tracker
 from tests.benchmarks import _deviant
 from tests.benchmarks._slides import FRICTION, slide
 from tests.benchmarks.table import Table
@@ -70,47 +68,3 @@ def power_table(*, quick: bool) -> list[Table]:
     return [
         make(quick=quick) for make in (_deviant.false_alarm_table, _deviant.mixed_table, _deviant.power_table)
     ]
-
-
-def speed_table(*, quick: bool) -> Table:
-    n, rate = 400_000 if quick else 1_000_000, 1e6
-    T = 1.0 / rate
-    z = 0.1 * np.arange(n) * T + NOISE * np.random.default_rng(1).normal(size=n)
-    start = in_cycle_filter.initial_state(T, NOISE, 1e5)
-    in_cycle_filter.update(start, z[:10])
-    best = math.inf
-    for _ in range(7):
-        state, before = start, time.perf_counter()
-        for block in np.split(z, n // 10_000):
-            state, ours = in_cycle_filter.update(state, block)
-        best = min(best, time.perf_counter() - before)
-    few = 5_000
-    oracle = KalmanFilter(3, 1)
-    oracle.F = np.array([[1.0, T, T * T / 2.0], [0.0, 1.0, T], [0.0, 0.0, 1.0]])
-    oracle.H = np.array([[1.0, 0.0, 0.0]])
-    oracle.Q, oracle.x = in_cycle_filter.process_noise(T, 1e5), np.zeros((3, 1))
-    oracle.R *= NOISE**2
-    oracle.P = np.diag([100.0 * NOISE**2, 1.0, 100.0])
-    theirs, slowest = np.empty((few, 3)), math.inf
-    for _ in range(2):
-        oracle.x, oracle.P = np.zeros((3, 1)), np.diag([100.0 * NOISE**2, 1.0, 100.0])
-        before = time.perf_counter()
-        for k in range(few):
-            oracle.predict()
-            oracle.update(z[k])
-            theirs[k] = oracle.x[:, 0]
-        slowest = min(slowest, time.perf_counter() - before)
-    _, ours = in_cycle_filter.update(start, z[:few])
-    apart = float((np.abs(ours - theirs).max(axis=0) / np.abs(theirs).max(axis=0)).max())
-    ratio = (n / best) / (few / slowest)
-    rows = [
-        [
-            "samples/s over filterpy's",
-            ">= 1000",
-            f"{ratio:.0f}",
-            f"{n / best / 1e6:.0f}e6 / {few / slowest:.0f}",
-        ],
-        ["difference from filterpy", "<= 1e-9", f"{apart:.1e}", "relative, largest"],
-        ["share of a core at 1 MHz", "< 2 %", f"{100 * best / (n * T):.2f} %", "blocks of 10000"],
-    ]
-    return Table("In-cycle filter", ["what", "bar", "measured", ""], rows, "Best of several runs of each.")

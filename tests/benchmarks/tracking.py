@@ -47,7 +47,6 @@ def tables(*, quick: bool = False) -> Iterator[Table]:
         _bends.step_table,
         _steps.table,
         _told_steps.table,
-        _signatures.speed_table,
         _signatures.error_table,
         _signatures.power_table,
         _sizes.table,

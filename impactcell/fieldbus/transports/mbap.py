@@ -23,11 +23,6 @@ MAX_LENGTH: Final = 254
 _AFTER_TRANSACTION: Final = struct.Struct(">HHB")
 
 
-def frame(transaction: int, unit: int, pdu: bytes) -> bytes:
-    """Put a PDU into a frame."""
-    return HEADER.pack(transaction, 0, len(pdu) + 1, unit) + pdu
-
-
 @lru_cache(maxsize=4096)
 def head_after_transaction(unit: int, pdu_length: int) -> bytes:
     """Give what stands between the transaction of a frame and its PDU."""

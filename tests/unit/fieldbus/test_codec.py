@@ -18,10 +18,15 @@ from impactcell.fieldbus.codec import (
     write_request,
 )
 from impactcell.fieldbus.registers import WIRE
-from impactcell.fieldbus.transports.mbap import FrameReader, frame
+from impactcell.fieldbus.transports.mbap import FrameReader
 
 PDU = st.binary(min_size=1, max_size=253)
 FRAMES = st.lists(st.tuples(st.integers(0, 65_535), st.integers(0, 255), PDU), max_size=6)
+
+
+def frame(transaction: int, unit: int, pdu: bytes) -> bytes:
+    """A PDU in a frame, as the specification has it."""
+    return struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu
 
 
 @given(FRAMES, st.data())

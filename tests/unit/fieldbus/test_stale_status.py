@@ -218,11 +218,14 @@ async def test_a_target_of_the_plc_with_a_wrong_bit_is_not_believed(layout: Regi
     async with running(layout, device) as (_, module, receptions):
         await anext(receptions)
         mangler.change = flip
+        believed = 0
         for _ in range(200):
             with contextlib.suppress(ProtocolError):
                 positioning = (await module.read_status()).positioning
                 assert positioning is not None
                 assert (positioning.target_sequence, positioning.target_m) == (0, pytest.approx(0.0123))
+                believed += 1
+        assert believed > 100
 
 
 async def test_a_part_that_moves_does_not_keep_the_status_block_from_being_read(fpga: RegisterMap) -> None:

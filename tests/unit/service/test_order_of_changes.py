@@ -184,6 +184,7 @@ async def test_positioning_is_shown_as_it_is_then(
         if world.taps:
             assert world.taps == [number]
             break
+    assert world.taps
     await asyncio.wait_for(cycle, PATIENCE_S)
 
 
