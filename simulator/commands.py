@@ -5,7 +5,7 @@ from typing import Final
 
 from simulator.image import RegisterImage
 from simulator.plant import TapInput
-from simulator.scenario import Positioning
+from simulator.scenario import Positioning, Scenario
 from simulator.scenario_file import MM_PER_MIN
 from simulator.tasks import PartSequence
 
@@ -16,35 +16,39 @@ LEAST_VELOCITY_M_S: Final = 1e-6
 """Slowest movement of the actuator [m/s]; a slower command is refused. An assumption of the simulator's."""
 
 
-class ModuleState(enum.IntEnum):
-    """Codes of the register `state`."""
+class ModuleState(enum.Enum):
+    """What the register `state` shows: names of its codes, the first that a map has."""
 
-    STARTING = 0
-    READY = 1
-    CYCLE_RUNNING = 2
-    BUSY = 3
-    FAULT = 4
+    READY = ("ready",)
+    CYCLE_RUNNING = ("cycle running", "busy", "not ready")
+    FAULT = ("fault", "not ready")
 
 
-class PositioningState(enum.IntEnum):
-    """Codes of the register `positioning_state`."""
+class PositioningState(enum.Enum):
+    """What the register `positioning_state` shows."""
 
-    NONE = 0
-    READY = 1
-    EXECUTING = 2
-    FAULT = 3
+    NONE = ("none",)
+    READY = ("ready",)
+    EXECUTING = ("executing",)
+    FAULT = ("fault",)
 
 
-class CommandResult(enum.IntEnum):
-    """Codes of the register `command_result`."""
+class CommandResult(enum.Enum):
+    """What the register `command_result` shows."""
 
-    NONE = 0
-    EXECUTING = 1
-    DONE = 2
-    REFUSED_VALUE = 3
-    REFUSED_STATE = 4
-    ABORTED = 5
-    FAULT = 6
+    EXECUTING = ("executing",)
+    DONE = ("done",)
+    REFUSED_VALUE = ("refused value",)
+    REFUSED_STATE = ("refused state",)
+    ABORTED = ("aborted",)
+    FAULT = ("fault",)
+
+
+_MEANWHILE: Final = {
+    CommandResult.EXECUTING: PositioningState.EXECUTING,
+    CommandResult.FAULT: PositioningState.FAULT,
+}
+"""State in which the module is with a result; it is ready with the others."""
 
 
 def commanded(image: RegisterImage, positioning: Positioning, parts: PartSequence) -> TapInput | None:
@@ -62,8 +66,16 @@ def commanded(image: RegisterImage, positioning: Positioning, parts: PartSequenc
 
 def show_result(image: RegisterImage, sequence: int, result: CommandResult) -> None:
     """Show what became, or is becoming, of a command."""
+    if result in _MEANWHILE:
+        image.put_code("positioning_state", _MEANWHILE[result].value)
     image.put("command_accepted", sequence)
-    image.put("command_result", result)
+    image.put_code("command_result", result.value)
+
+
+def show_ready(image: RegisterImage, scenario: Scenario) -> None:
+    """Show that the module takes commands, if it ever does."""
+    shown = PositioningState.NONE if scenario.positioning is None else PositioningState.READY
+    image.put_code("positioning_state", shown.value)
 
 
 def show_part(image: RegisterImage, parts: PartSequence, *, mass_stated: bool) -> None:

@@ -13,14 +13,7 @@ import numpy as np
 
 from impactcell.fieldbus.registers import RegisterMap, Words
 from simulator.announcements import BatchAnnouncer
-from simulator.commands import (
-    CommandResult,
-    ModuleState,
-    PositioningState,
-    commanded,
-    show_part,
-    show_result,
-)
+from simulator.commands import CommandResult, ModuleState, commanded, show_part, show_ready, show_result
 from simulator.cycle import RunningTap
 from simulator.image import RegisterImage
 from simulator.plant import NeverAtRestError, TapInput, simulate_tap
@@ -92,8 +85,8 @@ class Device:
         for name in ("acknowledged_cycle", "overwritten_count", *COMMAND_REGISTERS):
             self._image.put(name, 0)
         self._image.put("newest_slot", NO_SLOT)
-        self._image.put("state", ModuleState.READY)
-        self._show_ready()
+        self._show_state(ModuleState.READY)
+        show_ready(self._image, self.scenario)
         self._show_part()
         self._announcements.announce(self._made, self.cycle)
 
@@ -164,12 +157,11 @@ class Device:
         try:
             motion = simulate_tap(met.plant, strike)
         except NeverAtRestError:
-            self._image.put("state", ModuleState.FAULT)
-            self._image.put("positioning_state", PositioningState.FAULT)
+            self._show_state(ModuleState.FAULT)
             show_result(self._image, sequence, CommandResult.FAULT)
             return
         self._tap = RunningTap(strike, met, motion, self._now_s, sequence)
-        self._image.put("state", ModuleState.CYCLE_RUNNING)
+        self._show_state(ModuleState.CYCLE_RUNNING)
 
     def _finish(self, ended: RunningTap) -> None:
         """Put the cycle into the ring, now that the part is at rest."""
@@ -183,7 +175,7 @@ class Device:
         )
         header |= reported(self._image.registers, header, ended.met.random)
         self._rested_s = self._now_s
-        self._image.put("state", ModuleState.READY)
+        self._show_state(ModuleState.READY)
         if scenario.positioning is not None:
             self._parts.moved(ended.position_m, self._now_s)
         cycle = self._image.complete(samples, header)
@@ -192,7 +184,7 @@ class Device:
             aborted = bool(self._image.get("command_abort"))
             show_result(self._image, ended.sequence, CommandResult.ABORTED if aborted else CommandResult.DONE)
             self._image.put("command_abort", 0)
-            self._show_ready()
+            show_ready(self._image, self.scenario)
         self._tell(ended.truth(self._image.session, cycle, time_ns))
         self._show_part()
         self._announcements.announce(self._made, self.cycle)
@@ -246,13 +238,13 @@ class Device:
         for outcome in self._parts.outcomes():
             self._tell(outcome)
 
-    def _show_ready(self) -> None:
-        positioning = self.scenario.positioning
-        self._image.put("positioning_state", PositioningState.READY if positioning else PositioningState.NONE)
+    def _show_state(self, state: ModuleState) -> None:
+        self._state = state
+        self._image.put_code("state", state.value)
 
     def _command(self, sequence: int) -> None:
         positioning = self.scenario.positioning
-        if positioning is None or self._tap is not None or self._image.get("state") != ModuleState.READY:
+        if positioning is None or self._tap is not None or self._state is not ModuleState.READY:
             show_result(self._image, sequence, CommandResult.REFUSED_STATE)
             return
         self._image.put("command_cycle", 0)
@@ -261,7 +253,6 @@ class Device:
             show_result(self._image, sequence, CommandResult.REFUSED_VALUE)
             return
         show_result(self._image, sequence, CommandResult.EXECUTING)
-        self._image.put("positioning_state", PositioningState.EXECUTING)
         self._strike(strike, sequence)
 
     def _abort(self) -> None:

@@ -1,6 +1,6 @@
 """The register image of a module whose map may lack some registers, with its ring and acknowledgements."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,17 @@ class RegisterImage:
         """Show a value."""
         if name in self.registers:
             self._image.put(name, value)
+
+    def put_code(self, name: str, words: Sequence[str]) -> None:
+        """Show the code of the first of these words that the register has one for, if it has any."""
+        numbers = {word: number for number, word in self._codes(name).items()}
+        for word in words:
+            if word in numbers:
+                self._image.put(name, numbers[word])
+                return
+
+    def _codes(self, name: str) -> Mapping[int, str]:
+        return self.registers[name].codes if name in self.registers else {}
 
     def get(self, name: str) -> Any:
         """Return what a register shows."""

@@ -13,6 +13,12 @@ Location = tuple[str | int, ...]
 _SPOILS_FORCE = ("constant_force", "saturated", "no_separation", "not_a_number")
 """Faulty captures that are made of the force."""
 
+_PLACING = {
+    "positioning_state": {"ready", "executing"},
+    "command_result": {"executing", "done"},
+}
+"""Names of codes without which nobody sees what becomes of a command."""
+
 
 @dataclass(frozen=True, slots=True)
 class MapFault:
@@ -33,6 +39,13 @@ def map_faults(scenario: Scenario, registers: RegisterMap) -> Iterator[MapFault]
             message = f"`faulty_captures[{place}]` ({entry.kind}) is one of the force, and the register map "
             message += "has no `force`: leave it out, or give the map that register"
             yield MapFault(("faulty_captures", place, "kind"), message)
+    if scenario.positioning is not None:
+        for name, words in _PLACING.items():
+            missing = sorted(words - set(registers[name].codes.values())) if name in registers else []
+            if missing:
+                message = f"`positioning` cannot be shown: register {name} has no code named "
+                message += f"{' or '.join(map(repr, missing))}; name it under its `codes` in the register map"
+                yield MapFault(("positioning",), message)
     for location, name, value in _shown(scenario):
         fault = _fault_of(registers, name, value)
         if fault:

@@ -1,13 +1,17 @@
 """The module on command: taps by handshake, abort, and any order of it all."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
+from simulator.serving import read_register_map
+from tests.integration.processes import CONFIG
 from tests.module_client import MAP, Client, positioning, scenario
 
 
@@ -32,6 +36,26 @@ def test_a_tap_on_command_moves_the_part() -> None:
     assert back.start_m == pytest.approx(moved, abs=1e-9)
     assert back.position is not None
     assert back.position.values[-1] == pytest.approx(-client.truth[1]["displacement_m"], abs=1e-5)
+
+
+def test_states_are_shown_by_the_names_that_the_map_has_for_them(tmp_path: Path) -> None:
+    """Fixed numbers were shown: a map with others had a module that was never ready."""
+    content = yaml.safe_load((CONFIG / "maps" / "fpga-v1.yaml").read_text(encoding="utf-8"))
+    content["registers"]["state"]["codes"] = {0: "not ready", 1: "fault", 7: "ready"}
+    content["registers"]["positioning_state"]["codes"] = {10: "none", 11: "ready", 12: "executing"}
+    content["registers"]["command_result"]["codes"] = {4: "executing", 5: "done", 9: "refused value"}
+    (tmp_path / "map.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
+    client = Client(positioning(), read_register_map(tmp_path / "map.yaml"))
+    names = ("state", "positioning_state", "command_result")
+    assert [client.get(name) for name in names] == [7, 11, 0]
+    client.command(1)
+    assert [client.get(name) for name in names] == [0, 12, 4]
+    client.device.update(client.device.due_s)
+    assert [client.get(name) for name in names] == [7, 11, 5]
+    client.command(2, velocity=0.0)
+    assert [client.get(name) for name in names] == [7, 11, 9]
+    placeless = Client(scenario(), read_register_map(tmp_path / "map.yaml"))
+    assert placeless.get("positioning_state") == 10
 
 
 def test_the_same_command_twice_strikes_once() -> None:

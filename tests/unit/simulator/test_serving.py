@@ -178,18 +178,29 @@ UNSIGNED = {
             "`strikes.directions` cannot be shown: register direc",
         ),
         ("unsigned", "serial_number: @ABC", "register serial_number is a number, not 'ABC'"),
+        (
+            "nameless",
+            "positioning: @{directions: [1]}",
+            "`positioning` cannot be shown: register command_result has no code named 'done' or 'executing'",
+        ),
     ],
 )
 def test_what_a_map_cannot_show_is_told_before_anything_is_served(
     tmp_path: Path, layout: str, text: str, told: str, taken_port: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """`@` marks the place that is told."""
-    shipped = CONFIG / "maps" / f"{'summary' if layout == 'unsigned' else layout}.yaml"
-    content = yaml.safe_load(shipped.read_text())
+    shipped = {"unsigned": "summary", "nameless": "fpga-v1"}.get(layout, layout)
+    content = yaml.safe_load((CONFIG / "maps" / f"{shipped}.yaml").read_text())
     content["registers"] |= UNSIGNED if layout == "unsigned" else {}
+    if layout == "nameless":
+        content["registers"]["command_result"]["codes"] = {7: "refused value"}
     (tmp_path / "m.yaml").write_text(yaml.safe_dump(content))
     file = tmp_path / "s.yaml"
-    good = GOOD if "strikes" not in text else GOOD.replace("strikes: {period_s: 1}\n", "")
+    good = (
+        GOOD
+        if text.split(":", maxsplit=1)[0] not in ("strikes", "positioning")
+        else GOOD.replace("strikes: {period_s: 1}\n", "")
+    )
     file.write_text(good + text.replace("@", "") + "\n")
     assert main(["serve", str(file), "--port", taken_port]) == 2
     place = f"{file}:{good.count(chr(10)) + 1}:{text.index('@') + 1}: "
