@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from impactcell.german.open_loop import german_open_loop_sentence
+from impactcell.numerics.compilation import COMPILING
 from impactcell.physics.effect import German
 from impactcell.physics.effect_names import in_words
 from impactcell.physics.effects import LIBRARY
-from impactcell.process.progress import COMPILING
 
 REPORTS: Final[Mapping[str, str]] = {"en": "report.html", "de": "report.de.html"}
 """Files of the report by the language that it is in; the first is always there."""

@@ -4,6 +4,10 @@ Apart from `jit`, so that who asks to be told need not load the compiler.
 """
 
 from collections.abc import Callable
+from typing import Final
+
+COMPILING: Final = "compiling for this machine, once: a minute or two, longer on a slow or busy one"
+"""Said when machine code is missing, after an installation or an update."""
 
 _listeners: list[Callable[[], None]] = []
 

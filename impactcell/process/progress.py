@@ -6,14 +6,13 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final
 
+from impactcell.numerics.compilation import COMPILING
 from impactcell.process.console import print_note
 
 LINES_VARIABLE: Final = "IMPACTCELL_STEPS"
 """Variable of the environment that asks for a line a step on standard error."""
 STEP_PREFIX: Final = "step: "
 """Begins such a line."""
-COMPILING: Final = "compiling for this machine, once: a minute or two, longer on a slow or busy one"
-"""Said when machine code is missing, after an installation or an update."""
 
 
 @contextmanager

@@ -13,11 +13,10 @@ from impactcell import cell as core
 from impactcell.alarms.rules import journal_fault
 from impactcell.errors import ForeignJournalError, JournalError
 from impactcell.fieldbus.transports import Transports
-from impactcell.numerics.compilation import on_compilation
+from impactcell.numerics.compilation import COMPILING, on_compilation
 from impactcell.opcua.large_requests import leave_full_rounds_to_the_server
 from impactcell.process import log_lines, systemd
 from impactcell.process.cell_logger import CellLogger
-from impactcell.process.progress import COMPILING
 from impactcell.process.signals import stop_on_signals
 from impactcell.scada import Server
 from impactcell.service.cell_task import CellTask, SnapshotCallback
