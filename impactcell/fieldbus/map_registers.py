@@ -48,12 +48,16 @@ CONSTANTS: Final = (
 )  # fmt: skip
 """What a map may give as a number, for a module where it is always the same."""
 
+SHOWN: Final = (
+    "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
+    "command_accepted", "command_cycle",
+)  # fmt: skip
+"""Registers in which the module shows part, target and outcome; without one none of them is looked at."""
+
 _STATUS: Final = (
     "module_name", "serial_number", "map_version", "firmware_version",
     "state", "newest_slot", "session", "cycle_counter", "acknowledged_cycle", "overwritten_count",
-    "ring_cycle", "status_crc32", "batch_sequence", "batch_from_cycle", "batch_announced",
-    "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
-    "command_accepted", "command_cycle",
+    "ring_cycle", "status_crc32", "batch_sequence", "batch_from_cycle", "batch_announced", *SHOWN,
 )  # fmt: skip
 """What the module says of itself, of what is to come and of positioning."""
 

@@ -4,15 +4,11 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
+from impactcell.fieldbus.map_registers import SHOWN
 from impactcell.fieldbus.register_types import code_range
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.numerics.raster import ANY_VALUE, NEARLY_EQUAL, Raster
 
-SHOWN: Final = (
-    "positioning_state", "command_result", "part_position", "target_position", "target_sequence", "part_mass",
-    "command_accepted", "command_cycle",
-)  # fmt: skip
-"""Registers in which the module shows part, target and outcome; without one none of them is looked at."""
 PARAMETERS: Final = ("command_velocity", "command_stroke", "command_direction")
 """Registers that a tap is written to; then `command_sequence` has it made."""
 COMMAND: Final = (*PARAMETERS, "command_sequence")

@@ -15,8 +15,11 @@ VELOCITY: Final = PlausibleRange(
 STIFFNESS: Final = PlausibleRange("a stiffness", "N/m", 1e4, 1e9, {"N/mm": 1e3, "N/µm": 1e6})
 DAMPING: Final = PlausibleRange("a damping", "N s/m", 1.0, 1e5, {"N s/mm": 1e3, "N s/µm": 1e6})
 FRICTION: Final = PlausibleRange("a friction coefficient", "", 0.01, 1.5, {"%": 0.01})
+"""Ranges beyond which a value was hardly meant, with the units that it may have been said in. Our choice."""
 IN_THE_MAP: Final = ("module", "register_map")
+"""Where the cell file names what stands in the register map."""
 IN_THE_MODEL: Final = ("model",)
+"""Where it names what stands in the model file."""
 
 
 def doubted_values(cell: CellConfig) -> Iterator[tuple[tuple[str, ...], str]]:
