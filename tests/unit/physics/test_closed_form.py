@@ -99,7 +99,7 @@ def test_without_a_stroke_the_actuator_halts_at_separation() -> None:
 
 
 def test_gentlest_taps_without_a_stroke_move_a_part_this_far() -> None:
-    """0.06 mm for 5 kg at friction 0.12, 0.93 mm for 40 kg at 0.3: so a cell without a stroke places no finer."""
+    """0.06 mm for 5 kg at friction 0.12, 0.93 mm for 40 kg at 0.3, without a stroke."""
     for mass, mu_s, smallest in ((5.0, 0.12, 0.06e-3), (40.0, 0.3, 0.93e-3)):
         velocities = np.linspace(0.003, 0.04, 1000)
         row = np.array([6.5e5, 465.0, mu_s, 0.76 * mu_s, 0.0, mass, 0.0, 0.0])
