@@ -19,6 +19,8 @@ GERMAN: Final = {
         r"Datenträger oder Kontingent sind voll (\g<system>); Platz schaffen",
     r"cannot be used now \((?P<system>.+)\); check its disk, directory and owner":
         r"derzeit nicht verwendbar (\g<system>); Datenträger, Verzeichnis und Besitzer prüfen",
+    r"another program has it open for writing \(.+\); close it there":
+        r"ein anderes Programm hat es zum Schreiben geöffnet; es dort schließen",
     r"the disk failed \((?P<system>.+), (?P<code>\w+)\) though it is not full: its quota may be, or it is "
     r"broken or gone; see the system's log":
         r"der Datenträger versagt (\g<system>, \g<code>), ohne voll zu sein: sein Kontingent kann es sein, "

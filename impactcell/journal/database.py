@@ -25,6 +25,10 @@ WAY_OUT: Final = "run the version that wrote it, or name another file to begin a
 ANOTHER: Final = "it is left as it is; name another file"
 _NO_ROOM: Final = (errno.ENOSPC, errno.EDQUOT)
 _DAMAGED: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+_HELD: Final = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
+WRITE_PATIENCE_S: Final = 0.05
+"""How long a write waits for another program's to end, seconds: no cell is to stand still for it, and what
+cannot be written is tried again."""
 _MAGIC: Final = b"SQLite format 3\0"
 _APPLICATION_ID_AT: Final = 68
 """Where a database's header has it (The SQLite Database File Format, section 1.3)."""
@@ -47,6 +51,10 @@ def errors(path: Path) -> Iterator[None]:
             raise _io_error(path, error) from error
         if code in _DAMAGED:
             raise JournalDamagedError(f"{path}: is damaged and cannot be used ({error})") from error
+        if code in _HELD:
+            raise JournalUnavailableError(
+                f"{path}: another program has it open for writing ({error}); close it there"
+            ) from error
         raise _temporary_error(path, error, full=code == sqlite3.SQLITE_FULL) from error
     except UnicodeDecodeError as error:  # SQLite quotes a schema that is damaged
         raise JournalDamagedError(f"{path}: is damaged and cannot be used (its text is no UTF-8)") from error
@@ -142,6 +150,7 @@ def open_database(
                 database.execute("PRAGMA secure_delete = FAST")
                 _upgrade_file(database, path, upgrade)  # what is refused is left as it is
                 database.execute("PRAGMA journal_mode = WAL")
+                database.execute(f"PRAGMA busy_timeout = {round(1e3 * WRITE_PATIENCE_S)}")
         database.text_factory = partial(str, encoding="utf-8", errors="replace")  # a checksum finds it out
     except BaseException:
         database.close()

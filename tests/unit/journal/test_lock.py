@@ -112,9 +112,18 @@ def test_a_disk_that_fails_and_is_full_is_called_full(
         raise failed
 
 
-@pytest.mark.parametrize("code", [sqlite3.SQLITE_BUSY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY])
-def test_what_cannot_be_used_now_is_not_called_full(tmp_path: Path, code: int) -> None:
-    with pytest.raises(JournalUnavailableError, match="cannot be used now") as told, errors(tmp_path / "j"):
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        (sqlite3.SQLITE_BUSY, "close it there"),
+        (sqlite3.SQLITE_BUSY_SNAPSHOT, "close it there"),
+        (sqlite3.SQLITE_LOCKED, "close it there"),
+        (sqlite3.SQLITE_CANTOPEN, "cannot be used now"),
+        (sqlite3.SQLITE_READONLY, "cannot be used now"),
+    ],
+)
+def test_what_cannot_be_used_now_is_not_called_full(tmp_path: Path, code: int, words: str) -> None:
+    with pytest.raises(JournalUnavailableError, match=words) as told, errors(tmp_path / "j"):
         raise sqlite_error(code, "", "no")
     assert not isinstance(told.value, JournalFullError)
 
