@@ -80,7 +80,7 @@ class CellTask:
             cell.name,
             ModbusClient(transport or transport_for(module_link(cell))),
             cell.register_map,
-            self._link_changes.put_nowait,
+            self._take_link_change,
         )
         for text in not_promised(cell.register_map):
             self.log.info("register map %s: %s", cell.register_map.name, text)
@@ -129,7 +129,7 @@ class CellTask:
         try:
             async with asyncio.TaskGroup() as group:
                 group.create_task(self._acquire(), name=f"{self.cell.name} cycles")
-                group.create_task(self._publish_link(), name=f"{self.cell.name} link")
+                group.create_task(self._tell_link(), name=f"{self.cell.name} link")
                 if self._positioning is not None:
                     group.create_task(self._positioning.run(), name=f"{self.cell.name} taps")
                     group.create_task(self._publish_positioning(), name=f"{self.cell.name} positioning")
@@ -251,11 +251,20 @@ class CellTask:
     def _with_losses(self, status: ModuleStatus) -> ModuleStatus:
         return replace(status, missed=status.missed + self.worker.lost)
 
-    async def _publish_link(self) -> None:
+    def _take_link_change(self, status: ModuleStatus) -> None:
+        """Show it at once, before any cycle that comes over the new link; its alarm follows."""
+        self._publisher.publish_link(self._with_losses(status))
+        if status.connected:  # the values are those of before, and good again with the next cycle
+            self._mark_stale()
+        self._link_changes.put_nowait(status)
+
+    async def _tell_link(self) -> None:
         while True:
-            status = await self._link_changes.get()
-            self._publisher.publish_link(self._with_losses(status))
-            await self._fault_alarms.tell_link(status)
+            await self._fault_alarms.tell_link(await self._link_changes.get())
+
+    def _mark_stale(self) -> None:
+        self._stale = True
+        self._publisher.mark_stale(time.time_ns())
 
     async def _tick(self) -> None:
         while True:
@@ -266,8 +275,7 @@ class CellTask:
             silent_s = time.monotonic() - self._last_cycle_s
             late = silent_s > max(STALE_AT_LEAST_S, STALE_PERIODS * self.worker.period_s)
             if late and not self._stale and self._module.status.connected:
-                self._stale = True
-                self._publisher.mark_stale(time.time_ns())
+                self._mark_stale()
             await self.worker.retry()
             await self._fault_alarms.check_journal()
             if model_time_ns(self.cell) not in (0, self._model_seen_ns):

@@ -20,6 +20,8 @@ from impactcell.service.cell_task import CellTask
 from impactcell.service.fault_alarms import STANDS_S, FaultAlarms, SettledReason
 from impactcell.settings import read_cell
 from impactcell.settings.sections import JournalSection
+from impactcell.web.interface import Freshness
+from impactcell.web.live_feed import LiveFeed
 from tests.integration.processes import CONFIG
 from tests.patience import PATIENCE_S
 
@@ -125,7 +127,7 @@ async def test_a_lost_link_tells_why_it_is_lost_now(
     monkeypatch.setattr("impactcell.service.fault_alarms.STANDS_S", 0.0)
     monkeypatch.setattr("impactcell.service.cell_task.TICK_S", 0.01)
     name = module_connection.NAME
-    async with beside(task._publish_link()), beside(task._tick()):
+    async with beside(task._tell_link()), beside(task._tick()):
         task._module._report_link(connected=False, reason=SILENT)
         await says(task, name, "no connection within 0.5 s")
         await acknowledge(task, name)
@@ -142,6 +144,37 @@ async def test_a_lost_link_tells_why_it_is_lost_now(
             while alarm(task, name).active:
                 await asyncio.sleep(0.01)
     assert len(await transitions(task, tmp_path, name)) == 4
+
+
+class Shown:
+    """What OPC UA clients are told of all values of a cell."""
+
+    def __init__(self) -> None:
+        self.marks: list[str] = []
+
+    def mark_bad(self, *_: object) -> None:
+        self.marks.append("bad")
+
+    def mark_stale(self, *_: object) -> None:
+        self.marks.append("stale")
+
+    def module(self, *_: object) -> None: ...
+
+
+@pytest.mark.parametrize("task", [False], indirect=True)
+async def test_values_are_of_before_while_the_link_is_there_again_and_no_cycle_has_come(
+    task: CellTask,
+) -> None:
+    """They stayed lost until the next cycle where they had been stale before, and for a while else."""
+    shown, feed = Shown(), LiveFeed([task.cell.name])
+    task._publisher.server, task._publisher.feed = shown, feed  # type: ignore[assignment]
+    seen = []
+    for _ in range(3):
+        for connected in (True, False):
+            task._module._report_link(connected=connected, reason="" if connected else SILENT)
+            seen.append(feed.views[task.cell.name].freshness)
+    assert seen == [Freshness.STALE, Freshness.LOST] * 3
+    assert shown.marks == ["stale", "bad"] * 3
 
 
 @pytest.mark.parametrize("task", [False], indirect=True)

@@ -83,6 +83,8 @@ class World:
 
     def module(self, *_: object) -> None: ...
 
+    def mark_bad(self, *_: object) -> None: ...
+
 
 @pytest.fixture(scope="module")
 def cell() -> CellConfig:
