@@ -4,7 +4,7 @@ import contextlib
 import math
 import sqlite3
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import fmean
 from typing import Any, Final
@@ -16,7 +16,7 @@ from impactcell.journal.database import errors, open_database
 from impactcell.journal.stored_forms import load_alarms
 
 CYCLES_PER_COLUMN: Final = 60
-"""Cycles that are read and checked in one column; of more, the first so many stand for all."""
+"""Cycles whose means stand for all of a column, spread evenly over it where there are more."""
 SHIFTS: Final = 200
 """Transitions of the alarm of a batch shift that are looked at, the newest: more marks than a chart shows."""
 LOOKED_BACK: Final = 5000
@@ -52,13 +52,13 @@ class TrendColumn:
     time_ns : int
         Of its first cycle.
     cycles : int
-        How many cycles were looked at.
+        How many there are, without those that were found damaged.
     mu_s_low, mu_s_high : float or None
-        Smallest and largest static friction.
+        Smallest and largest static friction of all of them.
     level, level_std : float or None
-        Means of the tracked level and of its standard deviation.
+        Means of the tracked level and of its standard deviation, of `CYCLES_PER_COLUMN` at most.
     gap : float or None
-        Largest gap between model and measurement.
+        Largest gap between model and measurement of all of them.
     batch_id : str or None
         Batch of the last cycle.
     """
@@ -73,10 +73,28 @@ class TrendColumn:
     batch_id: str | None
 
 
-Finished = dict[tuple[int, int], TrendColumn | None]
-"""Columns that are over, by width and beginning in ns; None where there was no cycle."""
+@dataclass(slots=True)
+class Finished:
+    """What was read of a journal before, and stands as long as nothing of that time is added.
 
-_CYCLES: Final = "SELECT * FROM cycles WHERE time_ns >= ? AND time_ns < ? ORDER BY time_ns, seq LIMIT ?"
+    Attributes
+    ----------
+    columns : dict
+        Those that are over, by width and beginning in ns; None where there was no cycle.
+    newest : int
+        Number of the last row that they know of: rows with a later one may be of any time, for a module gives
+        after an outage what its ring still holds, and clocks differ.
+    """
+
+    columns: dict[tuple[int, int], TrendColumn | None] = field(default_factory=dict)
+    newest: int = 0
+
+
+_COUNT: Final = "SELECT count(*) FROM cycles WHERE time_ns >= ? AND time_ns < ?"
+_SPREAD: Final = (
+    "SELECT cycles.* FROM (SELECT seq, row_number() OVER (ORDER BY time_ns, seq) AS place FROM cycles "
+    "WHERE time_ns >= ? AND time_ns < ?) JOIN cycles USING (seq) WHERE (place - 1) % ? = 0 ORDER BY place"
+)
 _LAST: Final = (
     "SELECT * FROM cycles WHERE time_ns >= ? AND time_ns < ? ORDER BY time_ns DESC, seq DESC LIMIT 1"
 )
@@ -100,7 +118,7 @@ def trend(
 
     Parameters
     ----------
-    finished : dict, optional
+    finished : Finished, optional
         What was read before, and need not be read again; it is brought up to date.
 
     Raises
@@ -143,19 +161,34 @@ def _reading(path: Path) -> Iterator["_Reader"]:
 def _columns(
     reader: "_Reader", begins_ns: range, end_ns: int, finished: Finished | None
 ) -> tuple[TrendColumn, ...]:
-    known: Finished = {} if finished is None else finished
     width_ns = begins_ns.step
-    for old in [key for key in known if key[0] != width_ns or key[1] < begins_ns.start]:
-        del known[old]
+    known = _still_true(reader, begins_ns, finished or Finished())
     shown = []
     for begin_ns in begins_ns:
         key = width_ns, begin_ns
         column = known[key] if key in known else reader.column(begin_ns, min(begin_ns + width_ns, end_ns))
-        if begin_ns + 2 * width_ns <= end_ns:  # the clock of a module may be a little late
+        if begin_ns + 2 * width_ns <= end_ns:  # what is added to the newest would be read again at once
             known[key] = column
         if column is not None:
             shown.append(column)
     return tuple(shown)
+
+
+def _still_true(
+    reader: "_Reader", begins_ns: range, finished: Finished
+) -> dict[tuple[int, int], TrendColumn | None]:
+    """Give the finished columns, without those that are not asked for or to which cycles were added."""
+    known, width_ns = finished.columns, begins_ns.step
+    for old in [key for key in known if key[0] != width_ns or key[1] < begins_ns.start]:
+        del known[old]
+    newest = reader.newest()  # before any column is read: a row that comes meanwhile is new next time
+    if newest < finished.newest:
+        known.clear()  # the journal was begun anew
+    elif known:
+        for begin_ns in reader.begins_after(finished.newest, width_ns):
+            known.pop((width_ns, begin_ns), None)
+    finished.newest = newest
+    return known
 
 
 class _Reader:
@@ -170,23 +203,38 @@ class _Reader:
         row: tuple[int | None] = self._database.execute(query, (start_ns,)).fetchone()
         return row[0]
 
+    def newest(self) -> int:
+        """Give the number of the last row."""
+        row: tuple[int] = self._database.execute("SELECT coalesce(max(seq), 0) FROM cycles").fetchone()
+        return row[0]
+
+    def begins_after(self, seq: int, width_ns: int) -> list[int]:
+        """Find in which stretches the rows after `seq` are."""
+        query = "SELECT DISTINCT time_ns - time_ns % ? FROM cycles WHERE seq > ?"
+        return [begin_ns for (begin_ns,) in self._database.execute(query, (width_ns, seq))]
+
     def column(self, begin_ns: int, end_ns: int) -> TrendColumn | None:
         """Read one stretch; None without a cycle in it."""
-        rows = self._whole(_CYCLES, begin_ns, end_ns, CYCLES_PER_COLUMN)
+        stretch = begin_ns, end_ns
+        count: int = self._database.execute(_COUNT, stretch).fetchone()[0]
+        damaged = set[int]()
+        rows = self._whole(damaged, _SPREAD, *stretch, -(-count // CYCLES_PER_COLUMN)) if count else []
         if not rows:
             return None
-        last = self._whole(_LAST, begin_ns, end_ns) or rows[-1:]
+        last = self._whole(damaged, _LAST, *stretch) or rows[-1:]
         batch_id = last[0][self._at["batch_id"]]
-        mu_s, gap = self._values(rows, "mu_s"), self._values(rows, "gap")
         level, level_std = self._values(rows, "wear_level"), self._values(rows, "wear_level_std")
+        low, high, gap = (
+            self._extreme(damaged, extreme, *stretch) for extreme in ("min(mu_s)", "max(mu_s)", "max(gap)")
+        )
         return TrendColumn(
             int(rows[0][self._at["time_ns"]]),
-            len(rows),
-            min(mu_s, default=None),
-            max(mu_s, default=None),
+            count - len(damaged),
+            low,
+            high,
             fmean(level) if level else None,
             fmean(level_std) if level_std else None,
-            max(gap, default=None),
+            gap,
             None if batch_id is None else str(batch_id),
         )
 
@@ -211,9 +259,28 @@ class _Reader:
                 found[key] = Shift(time_ns, evidence.change_cycle, evidence.size, evidence.size_std)
         return tuple(sorted(found.values(), key=lambda shift: shift.time_ns))
 
-    def _whole(self, query: str, *arguments: int) -> list[tuple[Any, ...]]:
-        rows = self._database.execute(query, arguments).fetchall()
-        return [row for row in rows if self._tables.is_whole("cycles", row)]
+    def _extreme(self, damaged: set[int], extreme: str, begin_ns: int, end_ns: int) -> float | None:
+        """Find the smallest or largest value of a stretch that stands in a whole row; None without one."""
+        while True:
+            # SQLite takes the other columns from the row in which it found the extreme.
+            query = (
+                f"SELECT *, {extreme} FROM cycles WHERE time_ns >= ? AND time_ns < ? "  # noqa: S608 - ours
+                f"AND seq NOT IN ({', '.join(map(str, damaged))})"
+            )
+            row = self._database.execute(query, (begin_ns, end_ns)).fetchone()
+            value: float | None = row[-1]
+            if value is None or self._tables.is_whole("cycles", row[:-1]):
+                return value
+            damaged.add(row[self._at["seq"]])
+
+    def _whole(self, damaged: set[int], query: str, *arguments: int) -> list[tuple[Any, ...]]:
+        whole = []
+        for row in self._database.execute(query, arguments):
+            if self._tables.is_whole("cycles", row):
+                whole.append(row)
+            else:
+                damaged.add(row[self._at["seq"]])
+        return whole
 
     def _values(self, rows: list[tuple[Any, ...]], column: str) -> list[float]:
         return [row[self._at[column]] for row in rows if row[self._at[column]] is not None]

@@ -63,7 +63,7 @@ class Past:
     def _trend(self, path: Path, span: str) -> Trend:
         read_s, read = self._trends.get((path, span), (-1e9, ((), ())))
         if time.monotonic() - read_s > FRESH_S[span]:
-            end_ns, finished = time.time_ns(), self._finished.setdefault((path, span), {})
+            end_ns, finished = time.time_ns(), self._finished.setdefault((path, span), Finished())
             start_ns = end_ns - int(SPANS_S[span] * 1e9)
             columns = trend(path, start_ns, end_ns, COLUMNS, finished)
             read = columns, shifts(path, start_ns, end_ns)

@@ -56,7 +56,7 @@ def test_a_short_past_fills_the_chart_too(tmp_path: Path) -> None:
 def test_what_is_over_is_read_once_and_what_comes_is_seen(tmp_path: Path) -> None:
     path = tmp_path / "j.sqlite"
     store(path, [i * SECOND for i in range(60)], {1: "A"})
-    finished: Finished = {}
+    finished = Finished()
     before = trend(path, 0, 60 * SECOND, 6, finished)
     with sqlite3.connect(path) as database:  # nobody does this; it shows what is read again
         database.execute("UPDATE cycles SET mu_s = mu_s + 1, crc = NULL")
@@ -64,6 +64,45 @@ def test_what_is_over_is_read_once_and_what_comes_is_seen(tmp_path: Path) -> Non
     assert after[:5] == before[:5]
     assert after[5].mu_s_low == pytest.approx(1.051)
     assert next(column.mu_s_low for column in trend(path, 0, 60 * SECOND, 6)) == pytest.approx(1.001)
+
+
+@pytest.mark.parametrize("late_s", [0, 25, 100, 1000])
+def test_cycles_that_come_late_are_seen_where_they_belong(tmp_path: Path, late_s: int) -> None:
+    """The clock of a module is behind the service's; 24 cycles come from its ring after an outage."""
+    path, finished = tmp_path / "j.sqlite", Finished()
+    with Journal(path, CELL) as journal:
+        waiting = []
+        for second in range(2000, 4000, 10):
+            capture = replace(make_capture(second, samples=10), time_ns=(second - late_s) * SECOND)
+            waiting.append((capture, make_snapshot(capture)))
+            if not 3000 <= second < 3240:
+                for came in waiting:
+                    journal.append(*came, b"")
+                waiting = []
+            shown = trend(path, (second - 1999) * SECOND, second * SECOND, 100, finished)
+    assert shown == trend(path, 1991 * SECOND, 3990 * SECOND, 100)
+    within = sum(1991 <= second - late_s < 3990 for second in range(2000, 4000, 10))
+    assert sum(column.cycles for column in shown) in (within, within + 1), "the first column begins earlier"
+
+
+def test_a_journal_that_is_begun_anew_has_nothing_of_the_one_before(tmp_path: Path) -> None:
+    path, finished = tmp_path / "j.sqlite", Finished()
+    store(path, [i * SECOND for i in range(60)], {1: "A"})
+    trend(path, 0, 60 * SECOND, 6, finished)
+    path.unlink()
+    store(path, [i * SECOND for i in range(30)], {1: "B"})
+    columns = trend(path, 0, 60 * SECOND, 6, finished)
+    assert [(column.cycles, column.batch_id) for column in columns] == [(10, "B")] * 3
+
+
+def test_a_clock_that_steps_back_hides_nothing(tmp_path: Path) -> None:
+    path, finished = tmp_path / "j.sqlite", Finished()
+    with Journal(path, CELL) as journal:
+        for number, now_s in enumerate((*range(1000, 3000, 10), *range(2600, 3000, 10))):
+            capture = replace(make_capture(number, samples=10), time_ns=now_s * SECOND)
+            journal.append(capture, make_snapshot(capture), b"")
+            shown = trend(path, (now_s - 999) * SECOND, (now_s + 1) * SECOND, 100, finished)
+    assert shown == trend(path, 1991 * SECOND, 2991 * SECOND, 100)
 
 
 def test_a_damaged_row_is_left_out(tmp_path: Path) -> None:
@@ -78,12 +117,29 @@ def test_a_damaged_row_is_left_out(tmp_path: Path) -> None:
     assert second.batch_id == "A"
 
 
-def test_empty_stretches_are_left_out_and_full_ones_are_sampled(tmp_path: Path) -> None:
-    times = [SECOND * i for i in range(1, CYCLES_PER_COLUMN + 11)] + [10_000 * SECOND]
-    store(tmp_path / "j.sqlite", times, {1: "A"})
+def test_empty_stretches_are_left_out(tmp_path: Path) -> None:
+    store(tmp_path / "j.sqlite", [*(SECOND * i for i in range(1, 11)), 10_000 * SECOND], {1: "A"})
     columns = trend(tmp_path / "j.sqlite", 0, 10_001 * SECOND, 4)
     assert trend(tmp_path / "j.sqlite", 20_000 * SECOND, 30_000 * SECOND, 4) == ()
-    assert [column.cycles for column in columns] == [CYCLES_PER_COLUMN, 1]
+    assert [column.cycles for column in columns] == [10, 1]
+
+
+def test_the_band_of_a_full_stretch_is_of_all_its_cycles_and_the_level_of_its_whole_time(
+    tmp_path: Path,
+) -> None:
+    """Only the first 60 counted, though nothing said so."""
+    count, path = 5 * CYCLES_PER_COLUMN + 7, tmp_path / "j.sqlite"
+    store(path, [SECOND * i for i in range(1, count + 1)], {1: "A"})
+    (whole,) = trend(path, 0, 10_000 * SECOND, 1)
+    assert (whole.cycles, whole.mu_s_low, whole.mu_s_high) == (count, 0.001, count / 1e3)
+    assert whole.level == pytest.approx((1 + count) / 2e3, abs=CYCLES_PER_COLUMN / 1e4)
+    with sqlite3.connect(path) as database:  # the highest, the lowest, and the largest gap, are damaged
+        database.execute("UPDATE cycles SET mu_s = 7.0 WHERE cycle = 101")
+        database.execute("UPDATE cycles SET mu_s = -7.0 WHERE cycle IN (103, 104)")
+        database.execute("UPDATE cycles SET gap = 1e9 WHERE cycle = 109")
+    (rest,) = trend(path, 0, 10_000 * SECOND, 1)
+    assert rest.cycles == count - 4
+    assert (rest.mu_s_low, rest.mu_s_high, rest.gap) == (whole.mu_s_low, whole.mu_s_high, whole.gap)
 
 
 async def test_the_trend_of_a_cell(tmp_path: Path) -> None:
