@@ -7,7 +7,7 @@ A `Journal` is used from one thread at a time; `impactcell.service.worker` gives
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, replace
 from functools import partial
@@ -23,7 +23,7 @@ from impactcell.journal.database import Upgrade, check_name, errors, open_databa
 from impactcell.journal.history import HistoryQuery, Page, StoredValue, stored_alarms, stored_values
 from impactcell.journal.lock import lock_journal
 from impactcell.journal.presence import FilePresence
-from impactcell.journal.retention import Retention, prune
+from impactcell.journal.retention import Retention, borne_out_ns, prune
 from impactcell.journal.salvage import last_cycle_id, stored_captures
 from impactcell.journal.schema import cycle_row
 from impactcell.journal.stored_forms import ALARM, load_alarms
@@ -143,8 +143,7 @@ class Journal:
         Raises
         ------
         JournalUnavailableError
-            If it cannot be written now, JournalFullError if that is for lack of room; nothing of the cycle is
-            stored.
+            If it cannot be written now, JournalFullError if for lack of room; nothing of the cycle is stored.
         JournalGoneError
             If the file is no longer there; nothing counts as stored.
         JournalError
@@ -253,10 +252,15 @@ class Journal:
         with errors(self.path):
             self._db.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
 
-    def prune(self, keep: Retention, now_ns: int) -> bool:
+    def prune(self, keep: Retention, now_ns: int, active_ns: Collection[int] = ()) -> bool:
         """Drop what `keep` does not keep, and say if there is more; see `impactcell.journal.retention`."""
         with errors(self.path):
-            return prune(self._db, keep, now_ns)
+            return prune(self._db, keep, now_ns, active_ns)
+
+    def borne_out_ns(self, now_ns: int) -> int:
+        """Give the latest time that the cycles bear out; see `impactcell.journal.retention`."""
+        with errors(self.path):
+            return borne_out_ns(self._db, now_ns)
 
     def count(self) -> int:
         """Return how many cycles the journal holds."""

@@ -3,12 +3,12 @@
 import logging
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 from impactcell.errors import JournalDamagedError, JournalError, JournalGoneError
 from impactcell.journal.database import set_aside
-from impactcell.journal.retention import Retention
+from impactcell.journal.retention import SETTLED_NS, Retention
 from impactcell.journal.salvage import salvaged_state
 from impactcell.journal.store import Journal
 from impactcell.journal.stored_forms import upgraded_state
@@ -22,6 +22,8 @@ CHECKPOINT_EVERY = 24
 wait for that."""
 PRUNE_EVERY = 256
 """Cycles between two looks at what the journal may drop."""
+AHEAD_NS = 7 * 86_400 * 10**9
+"""A clock further ahead of the cycles before is told, nanoseconds; a machine may stand over a holiday."""
 
 Entry = Callable[[Journal], None]
 
@@ -85,6 +87,7 @@ class JournalWriter:
         self._saved: CycleId | None = None
         """Last cycle of a journal begun anew: what was written last may be in it after all, by its log."""
         self._since_pruned, self._since_checkpoint = PRUNE_EVERY, CHECKPOINT_EVERY
+        self._said_ahead = False
         if journal is not None:
             try:
                 self.durable = journal.last_cycle_id()
@@ -124,8 +127,16 @@ class JournalWriter:
         self._since_checkpoint += 1
         self.store(entry, cycle_id)
 
-    def maintain(self, time_ns: int) -> None:
-        """Do what no cycle has to wait for: empty the log, and drop what has become too old or too much."""
+    def maintain(self, time_ns: int, active_ns: Collection[int] = ()) -> None:
+        """Do what no cycle has to wait for: empty the log, and drop what has become too old or too much.
+
+        Parameters
+        ----------
+        time_ns : int
+            Of the last cycle.
+        active_ns : collection of int
+            Times of transitions of alarms that are active, which stay.
+        """
         if self.journal is None:
             return
         self._since_checkpoint = 0
@@ -135,7 +146,8 @@ class JournalWriter:
                 self._since_pruned = 0
                 # A module's clock that runs ahead must not make everything look old; 0 is no time at all.
                 self.journal.back_up_state()
-                if self.journal.prune(self._keep, min(time_ns or now_ns, now_ns)):
+                now_ns = self._borne_out_ns(self.journal, min(time_ns or now_ns, now_ns))
+                if self.journal.prune(self._keep, now_ns, active_ns):
                     self._since_pruned = PRUNE_EVERY
             else:
                 self.journal.checkpoint()
@@ -144,6 +156,19 @@ class JournalWriter:
             self.report(str(error))
         except JournalError as error:
             self.fault = str(error)
+
+    def _borne_out_ns(self, journal: Journal, now_ns: int) -> int:
+        """Give the time by which what is stored is old, and say once where the clock is far ahead of it."""
+        borne_out_ns = journal.borne_out_ns(now_ns)
+        is_ahead = now_ns - borne_out_ns > AHEAD_NS
+        if is_ahead and not self._said_ahead:
+            self._log.warning(
+                "the last cycle is dated over %d days after those before: unless the machine stood so long, "
+                "set the clock right; nothing is dropped for it before cycles have come for %g h",
+                (now_ns - borne_out_ns) // (86_400 * 10**9), SETTLED_NS / 3.6e12,
+            )  # fmt: skip
+        self._said_ahead = is_ahead
+        return borne_out_ns
 
     def store(self, entry: Entry, cycle_id: CycleId | None = None) -> None:
         """Write `entry` after all that could not be written before: no state may be ahead of its cycles."""
@@ -204,6 +229,14 @@ class JournalWriter:
         )
 
     def close(self) -> None:
-        """Close the journal."""
-        if self.journal is not None:
-            self.journal.close()
+        """Close the journal, after a last attempt to write what waits; what cannot be written is lost."""
+        if self.journal is None:
+            return
+        self.retry()
+        if self._waiting:
+            self._log.error(
+                "entries of the journal lost at the end of the service: %d; %s",
+                len(self._waiting),
+                self.fault,
+            )
+        self.journal.close()

@@ -263,7 +263,9 @@ class CellWorker:
 
     def _maintain(self, time_ns: int) -> None:
         try:
-            self._journal_writer.maintain(time_ns)
+            active = [alarm for alarm in self.alarms if alarm.active]
+            times_ns = {time_ns for alarm in active for time_ns in (alarm.activation, alarm.time_ns)}
+            self._journal_writer.maintain(time_ns, times_ns)
         except Exception:
             self.log.exception("the journal could not be tidied")
 

@@ -168,7 +168,8 @@ class JournalSection(Section):
     retain_captures_days: Positive = _RETENTION.captures_days
     """Captures older than this are dropped; their summaries stay."""
     max_size_mb: Positive = _RETENTION.max_size_bytes / 2**20
-    """Size that is kept; from 5 % below it on, captures are thinned, oldest first, then summaries."""
+    """Size that is kept; from 5 % below it on, captures are thinned, oldest first, then summaries. Alarms and
+    actions of people go before them where either take more than a tenth of it."""
 
 
 class MonitoringSection(Section):

@@ -91,7 +91,7 @@ def test_what_is_kept_follows_the_module_unless_it_has_no_time_or_runs_ahead(
     monkeypatch.setattr("impactcell.service.journal_writer.time.time_ns", lambda: 10**18)
     looks: list[int] = []
     with Journal(tmp_path / "j", "c") as journal:
-        monkeypatch.setattr(journal, "prune", lambda _, now_ns: looks.append(now_ns))
+        monkeypatch.setattr(journal, "prune", lambda _, now_ns, __: looks.append(now_ns))
         JournalWriter("c", journal, Retention()).maintain(module_ns)
     assert looks == [looked_ns]
 
