@@ -13,6 +13,7 @@ from impactcell.opcua.trust_list import der, read_certificate, thumbprint
 from impactcell.records import Alarm, ModuleStatus
 from impactcell.scada import RefusedError, Role
 from impactcell.scada.users import User, read_users
+from impactcell.web.cell_view import CellView
 from impactcell.web.interface import CellFacts
 from impactcell.web.page_context import PageContext
 from impactcell.web.requests import RequestRefusedError
@@ -40,7 +41,8 @@ class RefusedCertificate:
 
 async def system(context: PageContext, request: Request, session: BrowserSession) -> Response:
     """Show the system; users and certificates only to engineers."""
-    cells = await context.past.run(lambda: [_cell_system(context, facts) for facts in context.content.cells])
+    views = context.feed.views
+    cells = [await _cell_system(context, facts, views[facts.name]) for facts in context.content.cells]
     users: list[User] = []
     certificates: list[RefusedCertificate] = []
     if session.actor.role >= Role.ENGINEER:
@@ -94,10 +96,14 @@ def _users(path: Path) -> list[User]:
         return []
 
 
-def _cell_system(context: PageContext, facts: CellFacts) -> CellSystem:
-    view, size = context.feed.views[facts.name], 0
-    if facts.journal is not None:
-        for path in (facts.journal, facts.journal.with_name(facts.journal.name + "-wal")):
-            size += path.stat().st_size if path.exists() else 0
+async def _cell_system(context: PageContext, facts: CellFacts, view: CellView) -> CellSystem:
+    journal = facts.journal
+    size = 0 if journal is None else await context.past.run(lambda: _size(journal))
     fault = view.conditions.get(journal_fault.NAME)
     return CellSystem(facts, view.status, size, fault if fault is not None and fault.active else None)
+
+
+def _size(journal: Path) -> int:
+    """Give the size of a journal with its log, in bytes."""
+    files = (journal, journal.with_name(journal.name + "-wal"))
+    return sum(path.stat().st_size for path in files if path.exists())

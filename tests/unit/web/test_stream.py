@@ -224,3 +224,16 @@ async def test_more_viewers_than_allowed_are_told_so(tmp_path: Path) -> None:
         page.feed.subscribe()
     async with page.logged_in(Role.OBSERVER) as client:
         assert (await client.get("/live")).status_code == 503
+
+
+async def test_who_looks_at_the_system_takes_the_news_in_the_thread_of_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What another thread takes wakes nobody, and may be an older state after a newer one."""
+    page, threads, take = make_page(tmp_path), set(), CellView.take
+    seen = lambda view, news: (threads.add(threading.current_thread()), take(view, news))[1]  # noqa: E731
+    monkeypatch.setattr(CellView, "take", seen)
+    async with page.logged_in(Role.OBSERVER) as client:
+        page.feed.put(CellNews(CELL, status=ModuleStatus(connected=True, received=5)))
+        assert (await client.get("/system")).status_code == 200
+    assert threads == {threading.current_thread()}
