@@ -63,8 +63,8 @@ class PageContext:
     backend: PageBackend
     past: Past
     studies: StudyQueue
-    receiving: set[Path] = field(default_factory=set)
-    """Files that are being received."""
+    receiving: dict[Path, int] = field(default_factory=dict)
+    """Files that are being received, and the bytes that each takes."""
     _beside: set[asyncio.Task[None]] = field(default_factory=set)
     _templates: Environment = field(default_factory=_environment)
 

@@ -68,14 +68,20 @@ async def upload(context: PageContext, request: Request, _: BrowserSession) -> R
         raise RequestRefusedError(503, "error_queue_full")
     target = context.studies.store.files(study) / name
     study.files = {**study.files, name: 0}
-    context.receiving.add(target)
+
+    def study_bytes(size: int) -> int:
+        context.receiving[target] = size
+        coming = sum(more for path, more in context.receiving.items() if path.parent == target.parent)
+        return sum(study.files.values()) + coming
+
+    study_bytes(0)
     try:
-        size = await receive(request, target, sum(study.files.values()))
+        size = await receive(request, target, study_bytes)
         study.files = {**study.files, name: size}
     except ClientDisconnect:
         return Response(status_code=400)  # nobody reads it
     finally:
-        context.receiving.discard(target)
+        del context.receiving[target]
         if not study.files[name]:
             study.files = {other: size for other, size in study.files.items() if other != name}
     context.studies.store.save(study)

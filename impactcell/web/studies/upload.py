@@ -4,7 +4,7 @@ import asyncio
 import re
 import shutil
 import unicodedata
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 from typing import Final
 
@@ -57,8 +57,16 @@ def safe_name(name: str) -> str:
     return (stem.encode()[:MAX_STEM_BYTES].decode(errors="ignore") or "data") + suffix
 
 
-async def receive(request: Request, target: Path, already_bytes: int) -> int:
+async def receive(request: Request, target: Path, study_bytes: Callable[[int], int]) -> int:
     """Write the body of a request to a file that appears when it is whole; returns its size.
+
+    Parameters
+    ----------
+    request : Request
+    target : Path
+    study_bytes : callable
+        Told the bytes of this file, those that are announced or those that have come, gives those of all
+        files of the study.
 
     Raises
     ------
@@ -68,13 +76,17 @@ async def receive(request: Request, target: Path, already_bytes: int) -> int:
         It broke off. Nothing is left of it.
     """
     announced = request.headers.get("content-length", "")
-    allowed = MAX_BYTES - already_bytes
-    if announced.isdigit() and int(announced) > allowed:
-        raise RequestRefusedError(413, "error_file_too_large")
+    announced_bytes = int(announced) if announced.isdigit() else 0
+
+    def count(size: int) -> None:
+        if study_bytes(max(size, announced_bytes)) > MAX_BYTES:
+            raise RequestRefusedError(413, "error_file_too_large")
+
+    count(0)
     part = target.with_name(f"{target.name}.part")
     try:
         async with asyncio.timeout(LONGEST_S):
-            size = await _write(request.stream(), part, allowed)
+            size = await _write(request.stream(), part, count)
         if not size:
             raise RequestRefusedError(400, "error_file_empty")
         part.replace(target)
@@ -87,7 +99,7 @@ async def receive(request: Request, target: Path, already_bytes: int) -> int:
     return size
 
 
-async def _write(stream: AsyncIterator[bytes], part: Path, allowed: int) -> int:
+async def _write(stream: AsyncIterator[bytes], part: Path, count: Callable[[int], None]) -> int:
     size = 0
     with part.open("xb") as file:
         buffer = bytearray()
@@ -98,8 +110,7 @@ async def _write(stream: AsyncIterator[bytes], part: Path, allowed: int) -> int:
             if chunk is not None:
                 size += len(chunk)
                 buffer += chunk
-            if size > allowed:
-                raise RequestRefusedError(413, "error_file_too_large")
+                count(size)
             if buffer and (chunk is None or len(buffer) >= BUFFER_BYTES):
                 if shutil.disk_usage(part.parent).free < ROOM_LEFT_BYTES + len(buffer):
                     raise RequestRefusedError(507, "error_no_room")

@@ -512,6 +512,46 @@ async def test_too_large_too_much_and_twice(page: Page, monkeypatch: pytest.Monk
     assert [path.name for path in kept.iterdir()] == ["a.csv"]
 
 
+async def test_files_that_come_at_once_have_the_room_of_one_study(
+    page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(upload, "MAX_BYTES", 100)
+    half, whole = asyncio.Event(), asyncio.Event()
+
+    async def slow() -> AsyncIterator[bytes]:
+        yield b"x" * 30
+        half.set()
+        await whole.wait()
+        yield b"x" * 30
+
+    async def unannounced() -> AsyncIterator[bytes]:
+        yield b"x" * 60
+
+    async with page.logged_in(Role.OPERATOR) as client:
+        csrf = await csrf_of(client)
+        headers = {"x-csrf-token": csrf}
+
+        async def put(study: str, name: str, content: Any, **more: str) -> int:
+            address = f"/studies/{study}/files?name={name}"
+            return (await client.put(address, content=content, headers=headers | more)).status_code
+
+        begin = {"csrf": csrf, "cell": CELL, "title": "rail"}
+        one, other = [(await client.post("/studies", data=begin)).json()["id"] for _ in range(2)]
+        first = asyncio.create_task(put(one, "a.csv", slow(), **{"content-length": "60"}))
+        await half.wait()
+        assert await put(one, "b.csv", b"x" * 60) == 413
+        assert await put(one, "b.csv", unannounced()) == 413
+        assert await put(other, "b.csv", b"x" * 60) == 201, "another study has room of its own"
+        assert await put(one, "b.csv", b"x" * 40) == 201
+        whole.set()
+        assert await first == 201
+        assert await put(one, "c.csv", b"x") == 413
+    assert [page.studies.store.find(study).files for study in (one, other)] == [  # type: ignore[union-attr]
+        {"a.csv": 60, "b.csv": 40},
+        {"b.csv": 60},
+    ]
+
+
 async def test_two_gigabytes_are_refused_before_any_of_them_is_read(page: Page) -> None:
     asked: list[int] = []
 
