@@ -1,6 +1,7 @@
 """`/healthz` and Prometheus `/metrics` over HTTP for the cells of a process; off unless the YAML says so."""
 
 import contextlib
+import io
 import json
 import logging
 import math
@@ -10,8 +11,9 @@ import threading
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from time import monotonic
 from types import TracebackType
-from typing import Self
+from typing import Any, Final, Self
 
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.exposition import CONTENT_TYPE_LATEST, generate_latest
@@ -73,6 +75,8 @@ Health = Callable[[], Iterable[CellHealth]]
 
 PATIENCE_S = 5.0
 """How long a scraper may take to send its request, or to take the answer."""
+MAX_SCRAPERS: Final = 32
+"""Requests at a time, each in a thread; one more is closed before it is read."""
 
 _METRICS: tuple[tuple[str, str, str, Callable[[CellHealth], float]], ...] = (
     ("gauge", "connected", "1 while the module answers", lambda h: float(not h.link_fault)),
@@ -114,12 +118,55 @@ class _Cells(Collector):
         yield alarms
 
 
+class _Request(io.RawIOBase):
+    """What a scraper sends, all of it within `PATIENCE_S`."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        super().__init__()
+        self._connection = connection
+        self._until_s = monotonic() + PATIENCE_S
+
+    def readable(self) -> bool:
+        """Whether it can be read."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Read what has come, or wait for it as long as there is time."""
+        left_s = self._until_s - monotonic()
+        if left_s <= 0.0:
+            raise TimeoutError
+        self._connection.settimeout(left_s)
+        try:
+            return self._connection.recv_into(buffer)
+        finally:
+            self._connection.settimeout(PATIENCE_S)  # for the answer
+
+
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def __init__(self, host: str, port: int, handler: type[BaseHTTPRequestHandler]) -> None:
         self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        self._places = threading.BoundedSemaphore(MAX_SCRAPERS)
         super().__init__((host, port), handler)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Answer in a thread, where one is free."""
+        if not self._places.acquire(blocking=False):
+            self.shutdown_request(request)
+            return
+        try:
+            super().process_request(request, client_address)
+        except RuntimeError:  # no thread can be started
+            self._places.release()
+            raise
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Answer one request."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._places.release()
 
     def handle_error(self, request: object, client_address: object) -> None:  # noqa: ARG002 - its signature
         """Stay silent where a scraper has gone; say what else went wrong."""
@@ -143,7 +190,9 @@ class Monitoring:
         registry.register(_Cells(health))
 
         class Handler(BaseHTTPRequestHandler):
-            timeout = PATIENCE_S
+            def setup(self) -> None:
+                super().setup()
+                self.rfile = io.BufferedReader(_Request(self.connection))
 
             def do_GET(self) -> None:
                 page = self.path.partition("?")[0].rstrip("/")

@@ -5,6 +5,7 @@ import json
 import re
 import socket
 import struct
+import threading
 import urllib.error
 import urllib.request
 from dataclasses import replace
@@ -15,6 +16,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from impactcell.errors import SettingsError
 from impactcell.process.shipped import ROOT
+from impactcell.service import monitoring
 from impactcell.service.monitoring import CellHealth, Monitoring
 from tests.patience import PATIENCE_S
 
@@ -118,6 +120,45 @@ def test_a_port_in_use_is_said() -> None:
         pytest.raises(SettingsError, match="choose another"),
     ):
         Monitoring("127.0.0.1", taken.getsockname()[1], list).__enter__()
+
+
+def test_who_sends_a_byte_each_second_has_his_time_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    looks: list[float] = []
+    connected = threading.Event()
+    with Monitoring("127.0.0.1", 0, lambda: [PRESS]) as http, socket.socket() as client:
+
+        def a_second_later() -> float:
+            connected.wait(PATIENCE_S)
+            looks.append(float(len(looks)))
+            client.send(b"G")
+            return looks[-1]
+
+        monkeypatch.setattr(monitoring, "monotonic", a_second_later)
+        client.settimeout(PATIENCE_S)
+        client.connect(("127.0.0.1", http.port))
+        connected.set()
+        with contextlib.suppress(ConnectionError):  # what it has sent last is never read
+            assert client.recv(1) == b""
+        assert looks[-1] == monitoring.PATIENCE_S
+
+
+def test_there_are_so_many_scrapers_at_a_time_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(monitoring, "MAX_SCRAPERS", 2)
+    monkeypatch.setattr(monitoring, "PATIENCE_S", PATIENCE_S)
+    with Monitoring("127.0.0.1", 0, lambda: [PRESS]) as http:
+        address = "127.0.0.1", http.port
+        held = [socket.create_connection(address, timeout=PATIENCE_S) for _ in range(2)]
+        with socket.create_connection(address, timeout=PATIENCE_S) as one_more:
+            assert one_more.recv(1) == b""
+        for each in held:
+            each.sendall(b"GET /healthz HTTP/1.0\r\n\r\n")
+            with each, each.makefile("rb") as answer:
+                assert answer.readline() == b"HTTP/1.0 200 OK\r\n"
+        status = 0
+        while not status:  # the threads end in their own time
+            with contextlib.suppress(OSError):
+                status, _ = get(http.port, "/healthz")
+        assert status == 200
 
 
 def test_a_scraper_that_goes_away_is_no_news(
