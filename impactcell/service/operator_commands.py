@@ -18,41 +18,51 @@ class OperatorCommands:
     def __init__(self, cells: Mapping[str, CellTask]) -> None:
         self._cells = cells
 
-    def _cell(self, cell: str) -> CellTask:
+    def running(self, cell: str) -> CellTask:
+        """Give a cell that runs.
+
+        Raises
+        ------
+        RefusedError
+            It waits for its journal: what is done could not be written down.
+        """
         if cell not in self._cells:
-            raise RefusedError("BadInvalidState", f"{cell}: does not run, its journal cannot be opened")
+            raise RefusedError(
+                "BadInvalidState",
+                f"{cell}: does not run, its journal cannot be opened; its alarm JournalFault says why",
+            )
         return self._cells[cell]
 
     async def start_batch(self, cell: str, batch_id: str, *, expected: bool, actor: Actor) -> None:
         """Begin another batch of material."""
         audit = _audit(actor, "StartBatch", BatchId=batch_id, Expected=expected)
-        await self._cell(cell).worker.change_state(
+        await self.running(cell).worker.change_state(
             lambda state: core.start_batch(state, batch_id, expected=expected), audit
         )
 
     async def reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
         """Learn the wear level anew after worn parts were replaced."""
-        await self._cell(cell).worker.change_state(
+        await self.running(cell).worker.change_state(
             core.reset_wear_level, _audit(actor, "ResetWear", Comment=comment)
         )
 
     async def set_target(self, cell: str, target_m: float, actor: Actor) -> None:
         """Start a positioning task."""
         try:
-            await self._cell(cell).set_target(target_m, _audit(actor, "SetTarget", Target=target_m * 1e3))
+            await self.running(cell).set_target(target_m, _audit(actor, "SetTarget", Target=target_m * 1e3))
         except PositioningError as error:
             raise RefusedError("BadInvalidState", str(error)) from error
 
     async def abort_positioning(self, cell: str, actor: Actor) -> None:
         """End the positioning task that runs."""
         try:
-            await self._cell(cell).abort_positioning(_audit(actor, "AbortPositioning"))
+            await self.running(cell).abort_positioning(_audit(actor, "AbortPositioning"))
         except PositioningError as error:
             raise RefusedError("BadInvalidState", str(error)) from error
 
     async def record_model(self, cell: str, action: str, model: str, actor: Actor) -> None:
         """Write down that somebody has put another model into service."""
-        await self._cell(cell).worker.record(_audit(actor, f"model {action}", Model=model))
+        await self.running(cell).worker.record(_audit(actor, f"model {action}", Model=model))
 
     async def act_on_condition(
         self,
@@ -75,7 +85,7 @@ class OperatorCommands:
             shelve_ns=int(shelve_s * 1e9),
             activation=activation,
         )
-        transition = await self._cell(cell).worker.apply_event(alarm, alarm_event, audit)
+        transition = await self.running(cell).worker.apply_event(alarm, alarm_event, audit)
         if transition.refusal is not None:
             raise RefusedError(transition.refusal.value, f"{cell}: {alarm}: {transition.refusal.value}")
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import json
+import logging
 from collections.abc import Coroutine, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, TypeVar
@@ -15,6 +16,8 @@ from impactcell.service.operator_commands import OperatorCommands
 from impactcell.settings import CellConfig
 
 T = TypeVar("T")
+
+_log: Final = logging.getLogger(__name__)
 
 ACCEPT_S: Final = 1800.0
 """Longest time for calibrating a model: a law may have to be compiled, at the lowest priority."""
@@ -79,12 +82,23 @@ class PageGateway:
         return await self._in_service(audited(actor, f"{cell}: restore model", work))
 
     async def _change_model(self, cell: str, action: str, arguments: list[str], actor: Actor) -> str:
-        outcome = await run_verb(["model", *arguments, "--json"], ACCEPT_S)
+        self._commands.running(cell)  # before: a model that is in service is to be written down
+        try:
+            outcome = await run_verb(["model", *arguments, "--json"], ACCEPT_S)
+        except OSError as error:
+            raise RefusedError(
+                "BadResourceUnavailable",
+                f"{cell}: its model stays, no program can be started on this machine ({error.strerror}); "
+                "end others, and try again",
+            ) from error
         if not outcome.is_done:
             said = "\n".join(outcome.messages) or "it took too long"
             raise RefusedError("BadInvalidState", said)
         model = str(json.loads(outcome.output)["model"])
-        await self._commands.record_model(cell, action, model, actor)
+        try:
+            await self._commands.record_model(cell, action, model, actor)
+        except Exception:  # noqa: BLE001 - the model is in service, whatever went wrong afterwards
+            _log.exception("%s: model %s is in service, but not written down in the journal", cell, model)
         return model
 
     async def _trust(self, thumbprint: str) -> None:

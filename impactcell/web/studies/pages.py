@@ -1,6 +1,7 @@
 """The pages of studies: drop files, confirm what was read, see what came out, put its model into service."""
 
 import asyncio
+import logging
 from pathlib import Path
 from typing import Final
 
@@ -13,9 +14,11 @@ from impactcell.web.messages import Messages
 from impactcell.web.page_context import PageContext
 from impactcell.web.requests import CSRF_FIELD, RequestRefusedError
 from impactcell.web.sessions import BrowserSession
-from impactcell.web.studies.queue import is_choice
+from impactcell.web.studies.queue import PROGRAM_FAULT, is_choice
 from impactcell.web.studies.study import Acceptance, Goal, Stage, Study
 from impactcell.web.studies.upload import KINDS, MAX_FILES, receive, safe_name
+
+_log: Final = logging.getLogger(__name__)
 
 MAX_TITLE: Final = 80
 """Longest title, in characters."""
@@ -213,6 +216,9 @@ async def _change_model(
             study.acceptances = [*study.acceptances, done]
         except RefusedError as error:
             study.faults = str(error).splitlines()
+        except Exception:  # noqa: BLE001 - whatever it was, who asked is told
+            _log.exception("study %s: %s of the model of %s failed", study.id, action, study.cell)
+            study.faults = [PROGRAM_FAULT]
         finally:
             study.accepting = ""
             context.studies.store.save(study)

@@ -25,6 +25,8 @@ STUDY_S: Final = 3600.0
 """Longest time of a study."""
 MAX_FAULTS: Final = 40
 """Faults that are shown."""
+PROGRAM_FAULT: Final = "a fault of this program; its log has it"
+"""What is shown of a fault that nobody has foreseen."""
 _CHOICE: Final = re.compile(r"(?:column|unit|set)\..+|trigger", re.DOTALL)
 """Names of the fields with which a form says how files are to be read."""
 
@@ -116,7 +118,7 @@ class StudyQueue:
                 study.stage, study.faults = Stage.FAILED, [f"the disk: {error.strerror}"]
             except Exception:  # noqa: BLE001 - one study must not end those that wait
                 _log.exception("study %s failed by a fault of this program", study.id)
-                study.stage, study.faults = Stage.FAILED, ["a fault of this program; its log has it"]
+                study.stage, study.faults = Stage.FAILED, [PROGRAM_FAULT]
             finally:
                 if self._current is study:
                     self._current = None

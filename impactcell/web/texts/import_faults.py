@@ -8,8 +8,10 @@ from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, with_de
 from impactcell.web.texts.fault_pattern import COLUMN, PLACE, FaultPattern
 from impactcell.web.texts.faults_between_files import FAULTS_BETWEEN_FILES
 from impactcell.web.texts.import_notes import page_note
+from impactcell.web.texts.service_faults import SERVICE_FAULTS
 
 FAULTS: Final = (
+    *SERVICE_FAULTS,
     *FAULTS_BETWEEN_FILES,
     FaultPattern(
         r"(?P<cells>\d+) cells where the header has (?P<names>\d+)",

@@ -201,6 +201,25 @@ async def test_an_engineer_accepts_and_takes_back(page: Page) -> None:
     assert found.faults == ["part would not slide"]
 
 
+async def test_a_fault_while_a_model_is_accepted_is_told(
+    page: Page, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def fail(*_: object) -> str:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(page.backend, "accept_model", fail)
+    study = page.studies.store.begin("rail", "otto", CELL)
+    study.stage, study.result, study.changes = Stage.DONE, dict(RESULT), dict(CHANGES)
+    async with page.logged_in(Role.ENGINEER) as client:
+        await client.post(f"/studies/{study.id}/accept", data={"csrf": await csrf_of(client)})
+        await until(page, study.id, Stage.DONE)
+        shown = {code: (await client.get(f"/studies/{study.id}?lang={code}")).text for code in ("en", "de")}
+    assert "a fault of this program; its log has it" in shown["en"]
+    assert "ein Fehler dieses Programms; sein Log enthält ihn" in shown["de"]
+    assert f"study {study.id}: accept of the model of {CELL} failed" in caplog.text
+    assert "ZeroDivisionError" in caplog.text
+
+
 def write_model(arguments: Sequence[str]) -> None:
     """Leave what `discrepancy` does."""
     if arguments[0] == "discrepancy":
