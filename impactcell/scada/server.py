@@ -230,21 +230,24 @@ class Server:
         await self._actions.reset_wear(cell, comment, actor)
 
     async def _act(self, cell: str, alarm: str, action: ConditionAction, actor: Actor) -> None:
-        event, comment, shelve_s = action.event, action.comment, action.shelve_s
+        event, comment = action.event, action.comment
         if not allowed(actor.role, CONDITION_AREAS[event], Permission.CALL):
             raise RefusedError("BadUserAccessDenied")
         if fault := comment_fault(comment):
             raise RefusedError("BadOutOfRange", fault)
-        if event is EventKind.SHELVE_TIMED and not 0.0 < shelve_s <= MAX_SHELVE_S:
-            raise RefusedError("BadShelvingTimeOutOfRange")
+        shelve_s = 0.0
+        if event is EventKind.SHELVE_ONE_SHOT:
+            shelve_s = MAX_SHELVE_S
+        elif event is EventKind.SHELVE_TIMED:
+            shelve_s = action.shelve_s
+            if not 0.0 < shelve_s <= MAX_SHELVE_S:
+                raise RefusedError("BadShelvingTimeOutOfRange")
         activation = None
         if event in NAMES_EVENT:
             condition = self._conditions[cell, alarm]
             if not condition.is_current_event(action.event_id):
                 raise RefusedError("BadEventIdUnknown", "the alarm has come again since; look at it first")
             activation = condition.alarm.activation
-        if event is EventKind.SHELVE_ONE_SHOT:
-            shelve_s = MAX_SHELVE_S
         await self._actions.act_on_condition(
             cell, alarm, event, actor, comment=comment, shelve_s=shelve_s, activation=activation
         )

@@ -174,13 +174,33 @@ async def test_a_form_of_this_page_is_taken(page: Page) -> None:
     assert (actor.user, actor.role) == (NAMES[Role.OPERATOR], Role.OPERATOR)
 
 
+@pytest.mark.parametrize("minutes", ["30", "long", "nan", ""])
+async def test_minutes_are_for_shelving_alone(page: Page, minutes: str) -> None:
+    """They stand in the form beside every button."""
+    events = {
+        "acknowledge": EventKind.ACKNOWLEDGE,
+        "comment": EventKind.COMMENT,
+        "shelve": EventKind.SHELVE_TIMED,
+    }
+    async with page.logged_in(Role.OPERATOR) as client:
+        form = {"csrf": await csrf_of(client), **acknowledgement(raised()), "minutes": minutes}
+        for action in events:
+            answer = await client.post("/alarms/act", data=form | {"action": action})
+            assert answer.status_code == (400 if (action, minutes) == ("shelve", "long") else 303)
+    done = {action.event: action.shelve_s for _, _, action, _ in page.backend.acted}
+    shelved_s = done.pop(EventKind.SHELVE_TIMED, None)
+    assert done == {events["acknowledge"]: 0.0, events["comment"]: 0.0}
+    if minutes == "30":
+        assert shelved_s == 1800.0
+
+
 @pytest.mark.parametrize(
     ("change", "status"),
     [
         ({"alarm": "NoSuchAlarm"}, 400),
         ({"action": "disable"}, 400),
         ({"event_id": "zz"}, 400),
-        ({"minutes": "long"}, 400),
+        ({"action": "shelve", "minutes": "long"}, 400),
         ({"cell": "press-2"}, 404),
         ({"comment": "x" * MAX_FORM_BYTES}, 413),
     ],
