@@ -5,12 +5,13 @@ from typing import Final
 from starlette.requests import Request
 from starlette.responses import RedirectResponse, Response
 
-from impactcell.alarms import RULES, EventKind, is_retained
+from impactcell.alarms import RULES, EventKind
 from impactcell.errors import JournalError
-from impactcell.records import Alarm, Shelving
+from impactcell.records import Alarm
 from impactcell.scada import ConditionAction, RefusedError
 from impactcell.scada.alarm_events import event_id
 from impactcell.web.alarm_export import to_csv, to_xlsx
+from impactcell.web.cell_view import is_listed
 from impactcell.web.page_context import PageContext
 from impactcell.web.requests import RequestRefusedError
 from impactcell.web.sessions import BrowserSession
@@ -38,7 +39,7 @@ def _open_alarms(context: PageContext) -> list[OpenAlarm]:
         (cell, alarm, event_id(cell, alarm).hex())
         for cell, view in context.feed.views.items()
         for alarm in view.conditions.values()
-        if is_retained(alarm) or alarm.shelving is not Shelving.UNSHELVED
+        if is_listed(alarm)
     ]
     return sorted(alarms, key=lambda a: (a[1].acknowledged, not a[1].active, -a[1].severity, -a[1].time_ns))
 

@@ -9,9 +9,10 @@ from typing import Any, Final
 import msgspec
 import numpy as np
 
+from impactcell.alarms import is_retained
 from impactcell.german.positioning_reasons import german_positioning_reason
 from impactcell.quantities import BY_PATH, CYCLE, MODULE
-from impactcell.records import Alarm, Channel, ModuleStatus, Quality, Samples, Snapshot
+from impactcell.records import Alarm, Channel, ModuleStatus, Quality, Samples, Shelving, Snapshot
 from impactcell.records.quantity import Quantity, S
 from impactcell.scada.alarm_events import event_id
 from impactcell.web.curves import Curve, decimate, envelope
@@ -207,6 +208,11 @@ def _compared(
     return content
 
 
+def is_listed(alarm: Alarm) -> bool:
+    """Whether the page lists an alarm among those that are open."""
+    return is_retained(alarm) or alarm.shelving is not Shelving.UNSHELVED
+
+
 def alarm_content(cell: str, alarm: Alarm) -> dict[str, Any]:
     """Give an alarm with its reason and evidence, as the browser gets it."""
     evidence = alarm.evidence
@@ -216,6 +222,7 @@ def alarm_content(cell: str, alarm: Alarm) -> dict[str, Any]:
         "acknowledged": alarm.acknowledged,
         "confirmed": alarm.confirmed,
         "enabled": alarm.enabled,
+        "listed": is_listed(alarm),
         "shelved": alarm.shelving.value,
         "severity": alarm.severity,
         "message": {"en": alarm.message, "de": alarm.message_de},

@@ -3,8 +3,7 @@ import { showTimes } from "./frame.js";
 import { follow } from "./live.js";
 
 const open = document.getElementById("open"), renew = document.getElementById("renew");
-const told = new Map();
-let shown = null;
+const events = (ids) => ids.sort().join();
 
 async function load() {
   const answer = await fetch("/alarms/rows");
@@ -17,12 +16,9 @@ renew.addEventListener("click", load);
 
 follow("/live", {
   alarms({ cell, alarms }) {
-    told.set(cell, JSON.stringify(alarms.map((alarm) => alarm.event_id)));
-    const now = JSON.stringify([...told]);
-    const isFirst = shown === null;
-    if (now === shown) return;
-    shown = now;
-    if (isFirst) return;
+    const shown = [...open.querySelectorAll("[data-event]")].filter(({ dataset }) => dataset.cell === cell);
+    const now = events(alarms.filter((alarm) => alarm.listed).map((alarm) => alarm.event_id));
+    if (now === events(shown.map(({ dataset }) => dataset.event))) return;
     const typed = [...open.querySelectorAll('input[name="comment"]')].some((input) => input.value);
     if (typed || open.contains(document.activeElement)) renew.hidden = false;
     else load();

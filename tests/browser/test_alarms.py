@@ -1,0 +1,100 @@
+"""The list of open alarms is as of now where it is looked at, and stays as it is under somebody's hands."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from impactcell.scada.users import User, write_users
+from impactcell.web import CellFacts, CellNews, PageServer, PageSettings
+from tests.browser.chromium import Browser
+from tests.browser.test_lost_link import SEEN
+from tests.unit.web.page import NAMES, PASSWORD, Backend, raised
+
+pytestmark = pytest.mark.browser
+
+CELLS = ("press-1", "press-2", "press-3")
+ROWS_ASKED_FOR = """
+    const ask = fetch;
+    globalThis.rows_asked_for = 0;
+    globalThis.fetch = (...what) => { rows_asked_for += what[0] === "/alarms/rows"; return ask(...what); };
+"""
+
+
+@pytest.fixture(params=[1, 3], ids=["one cell", "three cells"])
+def server(request: pytest.FixtureRequest, browser: Browser, tmp_path: Path) -> Iterator[PageServer]:
+    """A page with somebody logged in; each cell has an alarm."""
+    users = tmp_path / "users.yaml"
+    write_users(users, {name: User(name, role, password="x") for role, name in NAMES.items()})
+    settings = PageSettings("http://127.0.0.1:0", users, tmp_path / "pki", tmp_path / "studies")
+    cells = CELLS[: request.param]
+    server = PageServer(settings, [CellFacts(name, "", "") for name in cells], Backend(users))
+    server.start()
+    for cell in cells:
+        server.feed.put(CellNews(cell, alarms=(raised(),)))
+    try:
+        browser.open(server.endpoint)
+        browser.log_in("otto", PASSWORD)
+        browser.until(lambda: browser.path == "/", "the cells")
+        yield server
+    finally:
+        server.stop()
+
+
+def put(server: PageServer, name: str, cycle: int) -> None:
+    alarm = replace(raised(), name=name, cycle=cycle)
+    server.feed.put(CellNews(CELLS[0], alarms=(alarm,)))
+
+
+def open_with(browser: Browser, server: PageServer, script: str) -> None:
+    """Open the alarms with a script that runs before those of the page."""
+    run = {"source": script}
+    added = browser.driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", run)
+    try:
+        browser.open(f"{server.endpoint}/alarms")
+    finally:
+        browser.driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
+
+
+def listed(browser: Browser) -> set[str]:
+    return {article.get_attribute("data-alarm") for article in browser.all("#open article")}
+
+
+def test_a_tab_that_was_opened_behind_others_lists_what_is_when_it_comes_in_front(
+    server: PageServer, browser: Browser
+) -> None:
+    open_with(browser, server, SEEN.replace("arguments", "[false]"))
+    before = listed(browser)
+    assert f"{CELLS[0]}-DeviantCycle" in before
+    put(server, "WearLimit", 8)
+    browser.run(SEEN, True)
+    after = before | {f"{CELLS[0]}-WearLimit"}
+    browser.until(lambda: listed(browser) == after, "the alarm that came meanwhile")
+
+
+def test_a_list_is_asked_for_where_it_has_changed_and_no_more(server: PageServer, browser: Browser) -> None:
+    open_with(browser, server, ROWS_ASKED_FOR)
+    put(server, "WearLimit", 8)
+    new = f"{CELLS[0]}-WearLimit"
+    browser.until(lambda: new in listed(browser), "the alarm that came")
+    assert browser.run("return rows_asked_for") <= 1  # none where the alarm came before the page
+    put(server, "BatchShift", 9)
+    browser.until(lambda: f"{CELLS[0]}-BatchShift" in listed(browser), "the next one")
+    assert browser.run("return rows_asked_for") <= 2
+
+
+def test_what_somebody_writes_stays_until_he_wants_the_list_anew(
+    server: PageServer, browser: Browser
+) -> None:
+    comment = f'[data-alarm="{CELLS[0]}-DeviantCycle"] input[name=comment]'
+    browser.open(f"{server.endpoint}/alarms")
+    browser.write(comment, "seen by")
+    browser.run(SEEN, False)
+    put(server, "WearLimit", 8)
+    browser.run(SEEN, True)
+    browser.find("#renew")
+    assert browser.find(comment).get_attribute("value") == "seen by"
+    browser.find("#renew").click()
+    browser.until(lambda: f"{CELLS[0]}-WearLimit" in listed(browser), "the alarm that came meanwhile")
+    assert not browser.all("#renew:not([hidden])")
