@@ -7,12 +7,12 @@ import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 from impactcell.api.findings import write_findings
 from impactcell.api.machine_findings import investigate_with_base, write_machine_findings
-from impactcell.campaign import Campaign, Excitation, naming, read
+from impactcell.campaign import Campaign, naming, read
+from impactcell.cli.free_slides import with_cell_mass
 from impactcell.cli.paths import check_directory, note_damage, open_journal
 from impactcell.cli.recorded_taps import campaign_of_taps
 from impactcell.discrepancy.data import CellLimits
@@ -138,7 +138,7 @@ def _read(
 ) -> tuple[str, Campaign]:
     if journal is None:
         assert campaign is not None  # noqa: S101 - one of them is given
-        return str(campaign.name), _with_mass(read(campaign), config)
+        return str(campaign.name), with_cell_mass(read(campaign), config)
     with open_journal(journal, None if config is None else config.name) as store:
         gravity_m_s2 = plant.gravity_m_s2 if plant else 9.81
         data = campaign_of_taps(journal, store.captures(damaged=note_damage), gravity_m_s2, config)
@@ -148,17 +148,6 @@ def _read(
             "that recorded these taps, --cell CELL.yaml: it states `actuator.stroke_mm`"
         )
     return str(journal.name), data
-
-
-def _with_mass(data: Campaign, config: CellConfig | None) -> Campaign:
-    """Take the mass of free slides, which do not show it, from their cell where they state none."""
-    mass_kg = None if config is None else config.settings.part.mass_kg
-    unstated = sum(math.isnan(shot.mass_kg) for shot in data.shots)
-    if mass_kg is None or not unstated or data.excitation is not Excitation.FREE_SLIDE:
-        return data
-    print_note(f"note: the mass of {unstated} slides is not stated: {mass_kg:g} kg, as the cell has it")
-    shots = (replace(one, mass_kg=mass_kg) if math.isnan(one.mass_kg) else one for one in data.shots)
-    return replace(data, shots=tuple(shots))
 
 
 def _limits(config: CellConfig | None) -> CellLimits:

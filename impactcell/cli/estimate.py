@@ -12,6 +12,7 @@ from typing import TextIO
 
 from impactcell.api.friction import calibrated_where_possible, with_masses
 from impactcell.campaign import Campaign, Excitation, from_contact, naming, read
+from impactcell.cli.free_slides import estimate_free_slides, no_estimate
 from impactcell.cli.paths import check_output
 from impactcell.discrepancy.data import (
     check_campaign_units,
@@ -19,16 +20,15 @@ from impactcell.discrepancy.data import (
     refuse_rotation,
     without_unlike_shots,
 )
-from impactcell.errors import CampaignError, PredictionError
+from impactcell.errors import CampaignError
 from impactcell.features import Features, extract
 from impactcell.prediction import Model, estimate_from_features
 from impactcell.prediction.contact_onset import fit_plant_and_onset, is_late, onset_sentence
-from impactcell.prediction.free_slide_friction import free_slide_friction
 from impactcell.process.console import print_note, print_result
 from impactcell.process.progress import progress
 from impactcell.process.whole_files import write_whole
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
-from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, as_recorded
+from impactcell.records import FrictionEstimate, as_recorded
 
 COLUMNS = (
     "shot", "mu_s_force", "mu_s_distance", "mu_s_combined", "mu_s", "mu_s_std", "mu_k", "mu_k_std",
@@ -50,7 +50,8 @@ def estimate(
     campaign : Path
         A campaign directory of taps, or of free slides (then only mu_k).
     cell : Path, optional
-        Cell whose model is used; without it the plant is fitted to the campaign, k_v = 0.
+        Cell whose model is used; without it the plant is fitted to the campaign, k_v = 0. Of free slides the
+        effects that act on a free part, and the mass where none is stated.
     output : Path, optional
         CSV file; without it the rows go to standard output.
     as_json : bool
@@ -83,13 +84,11 @@ def estimate(
     for note in notes_of_unlike(unlike):
         print_note(note)
     if campaign_data.excitation is Excitation.FREE_SLIDE:
-        rows = [
-            (shot.cycle, _of_free_slide(shot, campaign_data.gravity_m_s2)) for shot in campaign_data.shots
-        ]
+        rows = estimate_free_slides(campaign_data, cell)
     else:
         taps = with_masses([extract(shot) for shot in campaign_data.shots])
         rows = _of_taps(campaign_data, taps, cell)
-    rows += [(number, _no_estimate(told, told)) for number, told in unlike.items()]
+    rows += [(number, no_estimate(told, told)) for number, told in unlike.items()]
     rows.sort(key=lambda row: order.index(row[0]))
     if as_json:
         sys.stdout.write(_as_json(rows))
@@ -138,22 +137,6 @@ def _of_taps(
             rows.append((tap.capture.cycle, estimate_of(tap, model)))
             advance()
     return rows
-
-
-def _of_free_slide(shot: Capture, gravity_m_s2: float) -> FrictionEstimate:
-    nothing = "a free slide shows mu_k only"
-    try:
-        return replace(_no_estimate(nothing, nothing), mu_k=free_slide_friction(shot, gravity_m_s2))
-    except PredictionError as fault:
-        return _no_estimate(nothing, str(fault))
-
-
-def _no_estimate(why_no_mu_s: str, why_no_mu_k: str) -> FrictionEstimate:
-    nothing = Coefficient(reason=why_no_mu_s)
-    return FrictionEstimate(
-        mu_s=nothing, mu_k=Coefficient(reason=why_no_mu_k), by_force=nothing, by_distance=nothing,
-        combined=nothing, estimator=Estimator.NONE, peak_force_n=math.nan, sliding_distance_m=math.nan,
-    )  # fmt: skip
 
 
 def _as_json(rows: Sequence[tuple[int, FrictionEstimate]]) -> str:

@@ -12,6 +12,16 @@ TAP_REASONS: Final[Mapping[str, str]] = {
         r"das Modell trifft diesen Stoß nicht: die Abweichung ist \1-mal das Rauschen",
     r"the model misses these taps: residuals are (\S+) times the noise":
         r"das Modell trifft diese Stöße nicht: die Abweichung ist \1-mal das Rauschen",
+    r"the model misses this slide: residuals are (\S+) times the noise":
+        r"das Modell trifft diesen Gleitvorgang nicht: die Abweichung ist \1-mal das Rauschen",
+    r"the model misses these slides: residuals are (\S+) times the noise":
+        r"das Modell trifft diese Gleitvorgänge nicht: die Abweichung ist \1-mal das Rauschen",
+    r"constant friction misses this slide: residuals are (\S+) times the noise":
+        r"gleichbleibende Reibung trifft diesen Gleitvorgang nicht: die Abweichung ist \1-mal das Rauschen",
+    r"constant friction misses these slides: residuals are (\S+) times the noise":
+        r"gleichbleibende Reibung trifft diese Gleitvorgänge nicht: die Abweichung ist \1-mal das Rauschen",
+    r"run `impactcell discrepancy`": "`impactcell discrepancy` ausführen",
+    r"a free slide shows mu_k only": "freies Gleiten zeigt nur µk",
     r"the model does not make this tap: (.+)": r"das Modell ergibt diesen Stoß nicht: \1",
     r"the waveform fit did not settle": "die Anpassung an den Verlauf kam nicht zur Ruhe",
     r"the waveform does not show friction": "der Verlauf zeigt die Reibung nicht",
@@ -104,6 +114,8 @@ TAP_REASONS: Final[Mapping[str, str]] = {
     r"the position is constant": "die Position bleibt unverändert",
     r"the part did not slide": "das Teil glitt nicht",
     r"the part did not slow down": "das Teil wurde nicht langsamer",
+    r"the model's effects slow a part down more than this one was: check its mass":
+        "die Effekte des Modells bremsen ein Teil stärker, als dieses gebremst wurde: seine Masse prüfen",
     r"the slide is too short to show its deceleration":
         "das Gleiten ist zu kurz, um die Verzögerung zu zeigen",
 }  # fmt: skip

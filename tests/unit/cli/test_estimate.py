@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 from impactcell.campaign import Campaign, Excitation, Sensor, write
+from impactcell.campaign import read as read_campaign
 from impactcell.cli.estimate import COLUMNS, estimate
 from impactcell.errors import CampaignError, PredictionError
 from impactcell.records import Capture, Channel
+from impactcell.web.texts.reasons import german_reason
 from tests.taps import Tap
 
 PROTOTYPE = Path(__file__).resolve().parents[3] / "config" / "cells" / "prototype.yaml"
@@ -133,14 +135,94 @@ def test_free_slides_show_mu_k_only(tmp_path: Path) -> None:
     moved = np.where(times < 0.3 / 2.0, 0.3 * times - times**2, 0.0225)
     shot = Capture(1, math.nan, 1.0, None, Channel(times, -moved + rng.normal(0, 1e-4, 80)))
     estimate(
-        campaign(tmp_path / "c", [shot], excitation=Excitation.FREE_SLIDE, columns=("shot",)),
+        campaign(
+            tmp_path / "c", [shot], excitation=Excitation.FREE_SLIDE, columns=("shot",),
+            sensors={"position": Sensor(148.0, 1e-4)},
+        ),
         None,
         tmp_path / "o.csv",
-    )
+    )  # fmt: skip
     (row,) = rows(tmp_path / "o.csv")
     assert float(row["mu_k"]) == pytest.approx(2.0 / 9.81, abs=4.0 * float(row["mu_k_std"]))
     assert row["mu_s"] == ""
     assert (row["quality"], row["mu_k_quality"]) == ("bad", "good")
+    assert row["reason"] == "a free slide shows mu_k only"
+
+
+def viscous_slides(directory: Path, mass_kg: float, noise_m: float | None, c: float = 2.0) -> Path:
+    """Slides of v' = -0.2 g - c v in closed form, to either side."""
+    rng, braking, shots = np.random.default_rng(6), 0.2 * 9.81, []
+    for number in range(1, 7):
+        stop = math.log1p(c * 1.2 / braking) / c
+        times = np.arange(0.0, stop + 0.05, 1e-3)
+        moving = np.minimum(times, stop)
+        moved = (1.2 + braking / c) / c * -np.expm1(-c * moving) - braking / c * moving
+        values = (-1) ** number * moved + rng.normal(0.0, 2e-5, times.size)
+        shots.append(Capture(number, math.nan, mass_kg, None, Channel(times, values)))
+    sensors = {"position": Sensor(1e3, noise_m)}
+    columns = ("shot", "mass_kg")
+    return campaign(directory, shots, excitation=Excitation.FREE_SLIDE, columns=columns, sensors=sensors)
+
+
+@pytest.mark.parametrize("noise_m", [2e-5, None])
+def test_slides_that_constant_friction_misses_are_uncertain_with_their_gap(
+    tmp_path: Path, noise_m: float | None
+) -> None:
+    """Their mu_k was `good`, and off by a hundred of its standard deviations."""
+    estimate(viscous_slides(tmp_path / "c", 2.0, noise_m), None, tmp_path / "o.csv")
+    for row in rows(tmp_path / "o.csv"):
+        assert row["mu_k_quality"] == "uncertain"
+        assert float(row["gap"]) > 5.0
+        told = re.search(
+            r"constant friction misses this slide: residuals are (\S+) times the noise", row["reason"]
+        )
+        assert told is not None
+        assert float(told[1]) == pytest.approx(float(row["gap"]), rel=0.01)
+        assert row["reason"].endswith("; run `impactcell discrepancy`")
+        assert abs(float(row["mu_k"]) - 0.2) < 2.0 * float(row["mu_k_std"])
+        assert not set(german_reason(row["reason"]).split()) & {"the", "noise", "misses", "run", "shows"}
+
+
+@pytest.mark.parametrize("stated_kg", [18.9, math.nan])
+def test_what_a_cells_model_does_to_a_free_part_is_taken_off(
+    tmp_path: Path, stated_kg: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The prototype has 85 N s/m, a part of 18.9 kg, and here a position that is known to 1 %."""
+    settings = PROTOTYPE.read_text(encoding="utf-8").replace("../", f"{PROTOTYPE.parents[1]}/")
+    settings = settings.replace("sensors:\n", "sensors:\n  position_scale_error_percent: 1.0\n")
+    (tmp_path / "cell.yaml").write_text(settings, encoding="utf-8")
+    slides = viscous_slides(tmp_path / "c", stated_kg, 2e-5, 85.0 / 18.9)
+    estimate(slides, tmp_path / "cell.yaml", tmp_path / "o.csv")
+    for row in rows(tmp_path / "o.csv"):
+        assert row["mu_k_quality"] == "good"
+        assert float(row["mu_k"]) == pytest.approx(0.2, abs=5e-4)
+        assert float(row["mu_k_std"]) == pytest.approx(0.01 * 0.2, rel=0.05)
+    told = "the mass of 6 slides is not stated: 18.9 kg, as the cell has it" in capsys.readouterr().err
+    assert told == math.isnan(stated_kg)
+
+
+def test_forces_of_a_model_are_left_out_of_slides_without_a_mass_and_that_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = PROTOTYPE.read_text(encoding="utf-8").replace("../", f"{PROTOTYPE.parents[1]}/")
+    (tmp_path / "cell.yaml").write_text(settings.replace("part:\n  mass_kg: 18.9\n", ""), encoding="utf-8")
+    estimate(viscous_slides(tmp_path / "c", math.nan, 2e-5), tmp_path / "cell.yaml", tmp_path / "o.csv")
+    assert "viscous_friction of the cell's model is left out of 6 slides" in capsys.readouterr().err
+    assert {row["mu_k_quality"] for row in rows(tmp_path / "o.csv")} == {"uncertain"}
+
+
+def test_why_a_slide_shows_no_friction_is_in_its_row(tmp_path: Path) -> None:
+    """It was "a free slide shows mu_k only", of one that shows none."""
+    whole = read_campaign(viscous_slides(tmp_path / "c", 2.0, 2e-5))
+    position = whole.shots[2].position
+    assert position is not None
+    short = replace(position, time_s=position.time_s[:5], values=position.values[:5])
+    shots = [*whole.shots[:2], replace(whole.shots[2], position=short), *whole.shots[3:]]
+    write(replace(whole, shots=tuple(shots)), tmp_path / "short")
+    estimate(tmp_path / "short", None, tmp_path / "o.csv")
+    row = rows(tmp_path / "o.csv")[2]
+    assert (row["mu_k_quality"], row["gap"]) == ("bad", "")
+    assert row["reason"].endswith("the position record has only 5 samples")
 
 
 def test_what_cannot_be_used_is_named(tmp_path: Path) -> None:

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from impactcell.errors import CaptureError
-from impactcell.prediction.free_slide_friction import free_slide_friction
-from impactcell.records import Capture, Channel
+from impactcell.records import Capture
 from tests.benchmarks._viscous_regression import by_decrement, by_least_squares
 from tests.taps import Tap
 
@@ -66,22 +65,3 @@ def test_slides_that_cannot_be_used_are_left_out_or_named() -> None:
         by_least_squares(broken[:1])
     with pytest.raises(CaptureError, match="mass is not known"):
         by_decrement([replace(captures[0], mass_kg=float("nan"))])
-
-
-def test_free_slides_give_mu_k_in_either_direction() -> None:
-    rng = np.random.default_rng(10)
-    times = np.arange(60) / 148.0
-    for sign in (1.0, -1.0):
-        for speed in (0.2, 0.5):
-            stop = speed / 2.1
-            x = np.where(times < stop, speed * times - 1.05 * times**2, speed**2 / 4.2)
-            position = Channel(times, sign * x + rng.normal(0.0, 1e-4, 60), 1e-4)
-            found = free_slide_friction(Capture(1, float("nan"), 1.0, None, position), 9.81)
-            assert abs(found.value - 2.1 / 9.81) < 4.0 * found.std
-            elsewhere = replace(position, values=position.values - 3.0 * sign * position.values[-1])
-            moved = free_slide_friction(Capture(1, float("nan"), 1.0, None, elsewhere), 9.81)
-            assert moved.value == pytest.approx(found.value, rel=1e-6)
-    with pytest.raises(CaptureError, match="did not slide"):
-        free_slide_friction(
-            Capture(1, float("nan"), 1.0, None, Channel(times, rng.normal(0, 1e-4, 60), 1e-4)), 9.81
-        )
