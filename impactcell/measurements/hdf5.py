@@ -1,5 +1,6 @@
 """Reads HDF5 files, and MATLAB files of version 7.3, which are such, with h5py."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,8 @@ SCALE, OFFSET, FILLS = "scale_factor", "add_offset", ("_FillValue", "missing_val
 def read_hdf5(path: Path, limits: Limits) -> tuple[Table, ...]:
     """Read a table of each group: its vectors, the columns of its matrices and of its records.
 
-    Groups come in the order of their names, `shot10` after `shot9`.
+    What attributes and scalars of a group say holds for the groups within, unless these say otherwise. Groups
+    come in the order of their names, `shot10` after `shot9`.
 
     Raises
     ------
@@ -33,7 +35,7 @@ def read_hdf5(path: Path, limits: Limits) -> tuple[Table, ...]:
     h5py = reader_library("h5py", "HDF5", path)
     tables: list[Table] = []
     with damage_told(path, "HDF5"), h5py.File(path, "r") as file:
-        _read_group(h5py, file, path, limits, (0, 0), tables)
+        _read_group(h5py, file, path, limits, (0, 0), {}, tables)
     if not tables:
         raise MeasurementError(f"{path}: holds no column of numbers")
     return tuple(tables)
@@ -45,28 +47,43 @@ def _read_group(
     path: Path,
     limits: Limits,
     spent: tuple[int, int],
+    around: Mapping[str, object],
     tables: list[Table],
 ) -> int:
     """Read the tables of a group and of those within; the cells read so far."""
     depth, cells = spent
     columns: list[tuple[str, str | None, Any]] = []
     told: list[str] = []
-    for name in sorted(group, key=natural_key):
-        link = group.get(name, getlink=True)
-        if not isinstance(link, h5py.HardLink) or name.startswith("#"):
-            continue  # links may lead out of the file, or round in a circle; # is MATLAB's own
-        item = group[name]
+    names = [
+        name
+        for name in sorted(group, key=natural_key)
+        # links may lead out of the file, or round in a circle; # is MATLAB's own
+        if isinstance(group.get(name, getlink=True), h5py.HardLink) and not name.startswith("#")
+    ]
+    items = {name: group[name] for name in names}
+    said = {**around, **_said_in(h5py, group, items)}
+    for name, item in items.items():
         if isinstance(item, h5py.Group):
             if depth < MAX_DEPTH:
-                cells = _read_group(h5py, item, path, limits, (depth + 1, cells), tables)
-            continue
-        cells = _count(item, path, limits, cells)
-        columns += _columns(h5py, name, item, path, told)
+                cells = _read_group(h5py, item, path, limits, (depth + 1, cells), said, tables)
+        elif isinstance(item, h5py.Dataset):
+            cells = _count(item, path, limits, cells)
+            columns += _columns(h5py, name, item, path, told)
     limits.check_shape(f"{path}: {group.name}", 0, len(columns))
-    attributes = {key: _plain(value) for key, value in group.attrs.items()}
     note = "HDF5" if group.name == "/" else f"HDF5 group {group.name}"
-    tables += tables_of(str(path), columns, group.name.strip("/"), attributes, "".join([note, *told]))
+    tables += tables_of(str(path), columns, group.name.strip("/"), said, "".join([note, *told]))
     return cells
+
+
+def _said_in(h5py: Any, group: Any, items: Mapping[str, Any]) -> dict[str, object]:
+    """Give what attributes and scalars of a group say, scalars with their unit."""
+    said = {key: _plain(value) for key, value in group.attrs.items()}
+    for name, item in items.items():
+        if not isinstance(item, h5py.Dataset) or item.shape != () or not _is_plain(h5py, item):
+            continue
+        if item.dtype.names is None:
+            said[name] = f"{_plain(item[()])} {_unit_of(item) or ''}".strip()
+    return said
 
 
 def _count(item: Any, path: Path, limits: Limits, cells: int) -> int:
@@ -91,7 +108,7 @@ def _is_plain(h5py: Any, item: Any) -> bool:
 def _columns(
     h5py: Any, name: str, item: Any, path: Path, told: list[str]
 ) -> list[tuple[str, str | None, Any]]:
-    unit = next((str(_plain(item.attrs[key])) for key in UNIT_KEYS if key in item.attrs), None)
+    unit = _unit_of(item)
     if not item.size or item.ndim not in (1, 2) or not _is_plain(h5py, item):
         return []
     if _plain(item.attrs.get("MATLAB_class")) == "char" and item.ndim == 2:
@@ -112,6 +129,10 @@ def _columns(
         (titles[i] if titles else f"{name} {i + 1}", unit, np.ascontiguousarray(values[:, i]))
         for i in range(values.shape[1])
     ]
+
+
+def _unit_of(item: Any) -> str | None:
+    return next((str(_plain(item.attrs[key])) for key in UNIT_KEYS if key in item.attrs), None)
 
 
 def _unpacked(item: Any, path: Path, told: list[str]) -> Any:

@@ -1,6 +1,8 @@
 """Reads MATLAB files up to version 7.2 with scipy; those of 7.3 are HDF5."""
 
 import zlib
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,6 +20,10 @@ HEADER_BYTES, COMPRESSED = 128, 15
 format)."""
 CHUNK_BYTES = 1 << 20
 """Bytes unpacked at a time."""
+UNITS = ("units", "unit")
+"""Structures that hold the units of what stands beside them."""
+SCALAR = (str, float, int, np.generic)
+"""What says something of all vectors beside it."""
 
 
 def read_matlab(path: Path, limits: Limits) -> tuple[Table, ...]:
@@ -35,7 +41,7 @@ def read_matlab(path: Path, limits: Limits) -> tuple[Table, ...]:
             cells = limits.check_shape(f"{path}: {name}", max(shape, default=0), _width(shape), cells)
         content = loadmat(path, squeeze_me=True, struct_as_record=False, chars_as_strings=True)
     content = {name: value for name, value in content.items() if not name.startswith("__")}
-    tables = _tables(path, content, "", limits)
+    tables = _tables(path, content, "", limits, {})
     if not tables:
         raise MeasurementError(f"{path}: holds no vector of numbers")
     return tuple(tables)
@@ -70,34 +76,71 @@ def _width(shape: tuple[int, ...]) -> int:
     return -(-size // max(*shape, 1)) if shape else 1
 
 
-def _tables(path: Path, content: dict[str, Any], group: str, limits: Limits) -> list[Table]:
+def _tables(
+    path: Path, content: Mapping[str, Any], group: str, limits: Limits, around: Mapping[str, object]
+) -> list[Table]:
     columns: list[tuple[str, str | None, Any]] = []
     tables: list[Table] = []
-    said: dict[str, object] = {}
-    units = content.get("units", content.get("unit"))
+    said = {**around, **_scalars(content)}
+    units = _units(content)
     for name, value in content.items():
         fields = _fields(value)
         if fields is not None:
             if group.count(".") < 4:
-                tables += _tables(path, fields, f"{group}.{name}".strip("."), limits)
+                tables += _tables(path, fields, f"{group}.{name}".strip("."), limits, said)
         elif isinstance(value, np.ndarray) and value.dtype.kind == "O":
             for place, item in enumerate(value.ravel()[: limits.files].tolist(), 1):
                 inner = _fields(item)
                 if inner is not None:
-                    tables += _tables(path, inner, f"{group}.{name}({place})".strip("."), limits)
+                    tables += _tables(path, inner, f"{group}.{name}({place})".strip("."), limits, said)
         elif isinstance(value, np.ndarray) and value.ndim in (1, 2) and value.size:
             columns += _columns(name, value, units)
-        elif isinstance(value, str | float | int | np.generic):
-            said[name] = value
     limits.check_shape(str(path), 0, len(columns))
-    tables += _cell_tables(path, content, group)
+    tables += _cell_tables(path, content, group, said)
     own = tables_of(str(path), columns, group, said, "MATLAB")
     for table in own:
         limits.check_shape(str(path), len(table), len(table.columns))
     return own + tables
 
 
-def _cell_tables(path: Path, content: dict[str, Any], group: str) -> list[Table]:
+def _units(content: Mapping[str, Any]) -> object:
+    return next((content[name] for name in UNITS if name in content), None)
+
+
+def _scalars(content: Mapping[str, Any]) -> dict[str, object]:
+    """Give what scalars say, with their units, and those of structures that hold nothing else.
+
+    Where several of these have a scalar of one name, it is called by its structure, too.
+    """
+    units = _fields(_units(content)) or {}
+    said: dict[str, object] = {
+        name: f"{value} {units.get(name, '')}".strip()
+        for name, value in content.items()
+        if isinstance(value, SCALAR)
+    }
+    beside = {
+        name: _scalars(fields)
+        for name, value in content.items()
+        if (fields := _fields(value)) is not None and name not in UNITS and _is_flat(fields)
+    }
+    names = Counter(name for inner in (said, *beside.values()) for name in inner)
+    for structure, inner in beside.items():
+        said |= {name if names[name] == 1 else f"{structure}.{name}": value for name, value in inner.items()}
+    return said
+
+
+def _is_flat(fields: Mapping[str, Any]) -> bool:
+    """Whether a structure holds scalars alone, or structures that do."""
+    inner = [_fields(value) for value in fields.values()]
+    return all(
+        isinstance(value, SCALAR) if within is None else _is_flat(within)
+        for value, within in zip(fields.values(), inner, strict=True)
+    )
+
+
+def _cell_tables(
+    path: Path, content: Mapping[str, Any], group: str, said: Mapping[str, object]
+) -> list[Table]:
     """Give a table for each place in cell arrays of vectors; cell arrays of one length belong together."""
     by_length: dict[int, dict[str, list[Any]]] = {}
     for name, value in content.items():
@@ -110,7 +153,7 @@ def _cell_tables(path: Path, content: dict[str, Any], group: str) -> list[Table]
         for place in range(length):
             columns = [c for name, items in cells.items() for c in _columns(name, items[place], None)]
             tables += tables_of(
-                str(path), columns, f"{group} {place + 1}".strip(), note=f"MATLAB cell {place + 1}"
+                str(path), columns, f"{group} {place + 1}".strip(), said, f"MATLAB cell {place + 1}"
             )
     return tables
 

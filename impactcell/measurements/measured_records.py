@@ -37,6 +37,8 @@ class Record:
         Number of the shot, as a column says it; empty where none does.
     begun : datetime64 or None
         Moment from which the times count, where the file says it.
+    constant_as : str
+        How its file would say what is constant.
     """
 
     place: str
@@ -45,6 +47,7 @@ class Record:
     scalars: AbstractMapping[str, float | str] = field(default_factory=dict)
     shot: str = ""
     begun: np.datetime64 | None = None
+    constant_as: str = ""
 
 
 def records_by_file(tables: Sequence[Table], mapping: Mapping) -> dict[str, list[Record]]:
@@ -191,7 +194,8 @@ def _record(table: Table, place: str, shot: str, mapping: Mapping, faults: list[
             measured = item.unit.factor * mapping.given.signs.get(meaning, 1) * column.values[present]
             values[meaning] = _summed_up(times[meaning], measured) if item.summed_up else measured
     scalars = scalars_of(table, place, mapping, faults)
-    return Record(place, times, values, scalars, shot, None if clock is None else clock.begun)
+    begun = None if clock is None else clock.begun
+    return Record(place, times, values, scalars, shot, begun, table.constant_as)
 
 
 def _summed_up(time_s: Samples, speed: Samples) -> Samples:
@@ -264,4 +268,5 @@ def _together(first: Record, second: Record) -> Record:
         {**first.scalars, **second.scalars},
         first.shot,
         begun,
+        first.constant_as,
     )

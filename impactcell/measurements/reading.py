@@ -19,15 +19,15 @@ from impactcell.measurements.text_file import read_text
 from impactcell.measurements.unpacking import ARCHIVES, unpacked
 
 Reader = Callable[[Path, Limits], tuple[Table, ...]]
-KINDS: tuple[tuple[bytes, Reader], ...] = (
-    (b"PAR1", read_parquet),
-    (b"\x89HDF\r\n\x1a\n", read_hdf5),
-    (b"MATLAB 7.3", read_hdf5),
-    (b"MATLAB", read_matlab),
-    (b"TDSm", read_tdms),
-    (b"MDF ", read_mdf4),
+KINDS: tuple[tuple[bytes, Reader, str], ...] = (
+    (b"PAR1", read_parquet, "metadata of the schema, velocity = '3000 mm/min'"),
+    (b"\x89HDF\r\n\x1a\n", read_hdf5, "an attribute of its group or of the file, velocity = '3000 mm/min'"),
+    (b"MATLAB 7.3", read_hdf5, "a scalar, velocity_mm_min = 3000"),
+    (b"MATLAB", read_matlab, "a scalar, velocity_mm_min = 3000"),
+    (b"TDSm", read_tdms, "a property of its group or of the file, velocity = '3000 mm/min'"),
+    (b"MDF ", read_mdf4, "a channel, velocity in mm/min"),
 )
-"""First bytes of a file, and what reads it."""
+"""First bytes of a file, what reads it, and how it says what is constant."""
 
 
 def read_tables(
@@ -60,9 +60,9 @@ def read_tables(
             head = file.read(16)
         if head.startswith(ARCHIVES):
             return _packed(path, limits, dialect)
-        for begin, reader in KINDS:
+        for begin, reader, constant_as in KINDS:
             if head.startswith(begin):
-                return reader(path, limits)
+                return tuple(replace(table, constant_as=constant_as) for table in reader(path, limits))
         if path.suffix.lower() == ".mat":
             return read_matlab(path, limits)
         if path.suffix.lower() == ".json":

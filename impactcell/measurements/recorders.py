@@ -127,6 +127,7 @@ def _at_one_time(parts: Sequence[Record]) -> tuple[Record, str]:
         _of_all(parts),
         parts[0].shot,
         parts[0].begun,
+        parts[0].constant_as,
     )
     return together, f"{' and '.join(shown)}, {how}"
 

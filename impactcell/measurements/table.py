@@ -59,6 +59,8 @@ class Table:
         Decimal mark of numbers that the file writes as text.
     recording : str
         What its channels were recorded together with, where that is more than its file.
+    constant_as : str
+        How a file of its kind says what is constant in a record, by the example of the velocity.
     """
 
     source: str
@@ -69,6 +71,7 @@ class Table:
     lines: Lines | None = None
     decimal: str = "."
     recording: str = ""
+    constant_as: str = "'velocity: 3000 mm/min' in a line above the table"
 
     @property
     def recorded_in(self) -> str:

@@ -146,8 +146,8 @@ def _with_velocity(
             why = ": its column changes within the record, so it was measured" if varies else ""
             faults.append(
                 f"{record.place}: the velocity of the actuator is not known{why}; name the column of the "
-                "commanded one with --column velocity=NAME, write it as 'velocity: 3000 mm/min' in a line "
-                "above the table, or give --set 'velocity=3000 mm/min'"
+                f"commanded one with --column velocity=NAME, write it as {record.constant_as}, or give "
+                "--set 'velocity=3000 mm/min'"
             )
             continue
         taps.append(_TapRecord(record, onset, abs(velocity)))
