@@ -12,13 +12,14 @@ from impactcell.measurements.recognition import (
     CHANNELS,
     ROTATION_WORDS,
     SPEED_OF,
+    SYMBOL_MATCH,
     VOCABULARY,
     WORD_MATCH,
     ColumnMeaning,
     name_score,
 )
 from impactcell.measurements.sampling_step import doubt_of_step, sampling_step_s
-from impactcell.measurements.table import Table
+from impactcell.measurements.table import MeasuredColumn, Table
 from impactcell.measurements.units import Dimension, MeasuredUnit
 from impactcell.records import Samples
 
@@ -36,6 +37,9 @@ UNITLESS = (
 """Quantities that need no unit."""
 ASCENDING_SHARE = 0.8
 """Share of steps forward from which on a column may be a time: it begins anew with each shot of a file."""
+
+TURN_ROUND = "turn the rows of the file round"
+"""What to do where the last row was recorded first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +90,8 @@ def lacking(
         sampling_step_s(table, constants) is None for table in tables
     ):
         unused = {item.column for item in assignments if item.meaning is ColumnMeaning.IGNORED}
-        faults.append(
-            f"no column of time was found{_no_time(tables, unused)}; name it with --column time=NAME, or "
-            f"give its rate, as --set rate=10kHz"
-        )
+        named = {item.column for item in assignments if _is_called_time(item)}
+        faults.append(f"no column of time was found{_no_time(tables, named, unused)}")
     if not {ColumnMeaning.POSITION, ColumnMeaning.FORCE} & present:
         names = ", ".join(repr(item.column) for item in assignments)
         faults.append(
@@ -161,29 +163,62 @@ def _contradictions(assignments: Sequence[Assignment]) -> list[str]:
     return faults
 
 
-def _no_time(tables: Sequence[Table], unused: AbstractSet[str]) -> str:
-    """Say why what seems to tell the time does not, or which `unused` one goes up as a time does."""
+def _is_called_time(item: Assignment) -> bool:
+    """Whether a column is called as a time; by a symbol, as t, only where it is in a unit of time, too."""
+    score = name_score(item.column, ColumnMeaning.TIME)[0]
+    return score >= WORD_MATCH or (
+        score >= SYMBOL_MATCH and item.unit is not None and item.unit.dimension is Dimension.TIME
+    )
+
+
+def _no_time(tables: Sequence[Table], named: AbstractSet[str], unused: AbstractSet[str]) -> str:
+    """Say why what is `named` so is no time, or which `unused` one goes up as a time, and the way out."""
+    way = "; name it with --column time=NAME, or give its rate, as --set rate=10kHz"
     for table in tables:
         if doubt := doubt_of_step(table):
-            return f": {doubt}"
+            return f": {doubt}{way}"
     for table in tables:
         for column in table.columns:
-            if name_score(column.name, ColumnMeaning.TIME)[0] < WORD_MATCH:
+            if column.name not in named:
                 continue
             if column.text is not None:
                 holds = unread_moments(column.text)[0] or "text"
-                return f": {column.name!r} holds {holds}, as {column.text[0][:40]!r}"
+                return f": {column.name!r} holds {holds}, as {column.text[0][:40]!r}{way}"
             if not ascends(column.values):
-                steps = np.diff(column.values)
-                return f": {column.name!r} goes forward in {np.sum(steps > 0.0)} of {steps.size} steps only"
+                return _no_ascent(column, way)
     for table in tables:
         for column in table.columns:
             if column.name not in unused or column.text is not None or not ascends(column.values):
                 continue
             step = float(np.median(np.diff(column.values)))
             if step != round(step):
-                return f": {column.name!r} goes up by {step:.6g} a row and may be it, in a unit to be said"
-    return ""
+                return (
+                    f": {column.name!r} goes up by {step:.6g} a row and may be it, in a unit to be said{way}"
+                )
+    return way
+
+
+def _no_ascent(column: MeasuredColumn, way: str) -> str:
+    steps = np.diff(column.values)
+    if runs_backwards(steps):
+        return f": {column.name!r} runs backwards; {TURN_ROUND}"
+    forward = f": {column.name!r} goes forward in {np.sum(steps > 0.0)} of {steps.size} steps"
+    if (steps >= 0.0).all() and steps.any():
+        return f"{forward} and repeats in the others; {more_digits(column.name)}"
+    return f"{forward} only{way}"
+
+
+def runs_backwards(steps: Samples) -> bool:
+    """Whether steps of a time are those of a file whose last row was recorded first."""
+    return bool((steps <= 0.0).all() and steps.any())
+
+
+def more_digits(column: str) -> str:
+    """Give the way out of times that repeat."""
+    return (
+        f"rounded times do so: export them with more digits, or say --column 'ignored={column}' "
+        f"--set rate=10kHz, with the rate of the recorder, where that is constant"
+    )
 
 
 def changes_within(values: Samples) -> bool:

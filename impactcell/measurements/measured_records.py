@@ -10,6 +10,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from impactcell.campaign import LARGEST
 from impactcell.errors import MeasurementError
+from impactcell.measurements.assignment import TURN_ROUND, more_digits, runs_backwards
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.groups import places_beside
 from impactcell.measurements.mapping import Mapping
@@ -237,13 +238,14 @@ def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:
 
 def _not_increasing(table: Table, column: MeasuredColumn, steps: Samples) -> str:
     """Tell times that go back, which several shots do, from times that only repeat, which rounding makes."""
+    if runs_backwards(steps):
+        return f"{table.title}: column {column.name!r} (time) runs backwards; {TURN_ROUND}"
     goes_back = bool((steps < 0.0).any())
     rows = np.flatnonzero(steps < 0.0 if goes_back else steps == 0.0) + 1
     way_out = (
         "several shots in one file need a column that numbers them (--column shot=NAME)"
         if goes_back
-        else f"rounded times do so: export them with more digits, or say --column 'ignored={column.name}' "
-        f"--set rate=10kHz, with the rate of the recorder, where that is constant"
+        else more_digits(column.name)
     )
     row = int(rows[0])
     return (

@@ -7,28 +7,20 @@ from impactcell.german.data_faults import german_message
 from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, with_decimal_commas
 from impactcell.web.texts.fault_pattern import COLUMN, PLACE, FaultPattern
 from impactcell.web.texts.faults_between_files import FAULTS_BETWEEN_FILES
+from impactcell.web.texts.faults_of_times import FAULTS_OF_TIMES
 from impactcell.web.texts.import_notes import page_note
 from impactcell.web.texts.service_faults import SERVICE_FAULTS
 
 FAULTS: Final = (
     *SERVICE_FAULTS,
     *FAULTS_BETWEEN_FILES,
+    *FAULTS_OF_TIMES,
     FaultPattern(
         r"(?P<cells>\d+) cells where the header has (?P<names>\d+)",
         "{cells} cells where the header has {names}",
         "{cells} Zellen, die Kopfzeile hat {names}",
     ),
     FaultPattern(r"and (?P<count>\d+) more faults", "and {count} more faults", "und {count} weitere Fehler"),
-    FaultPattern(
-        r"no column of time was found(?P<why>.*); name it with --column .*",
-        "no column of time was found{why}; choose it in the form below, or give the sampling rate there",
-        "keine Zeitspalte gefunden{why}; unten im Formular wählen, oder dort die Abtastrate angeben",
-    ),
-    FaultPattern(
-        r"has no column of time(?P<why>.*); name it, .*",
-        "has no column of time{why}; choose it in the form below, or give the sampling rate there",
-        "hat keine Zeitspalte{why}; unten im Formular wählen, oder dort die Abtastrate angeben",
-    ),
     FaultPattern(
         r"the line (['\"])(?P<line>.+)\2 may say (?P<one>\S+) or (?P<other>\S+); write it so.*",
         "the line “{line}” may say {one} or {other}; write it so, or give it for all shots in the form below",

@@ -4,6 +4,7 @@ import contextlib
 import json
 import warnings
 import zipfile
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -116,6 +117,37 @@ def test_times_that_were_rounded_are_told_from_several_shots(tmp_path: Path) -> 
     (shot,) = campaign.read(out).shots
     assert shot.force is not None
     assert np.diff(shot.force.time_s) == pytest.approx(9e-4, rel=1e-4)
+
+
+@pytest.mark.parametrize("name", ["t [s]", "Zeit [s]"])
+def test_rounded_times_of_which_few_go_forward_are_told_so_by_word_and_by_symbol(
+    tmp_path: Path, name: str
+) -> None:
+    """Of `t` it was said that no column of time was found, and no more."""
+    rows = [f"{1e-4 * n:.3f},{f:.6g},{x:.7g}" for n, (f, x) in enumerate(zip(FORCE, PLACE, strict=True))]
+    content = "\n".join([f"{name},force [N],position [m]", *rows])
+    told = refused(tmp_path, content, *VELOCITY)
+    column, steps = name.split(maxsplit=1)[0], len(rows) - 1
+    forward = sum(float(one.split(",")[0]) > float(other.split(",")[0]) for other, one in pairwise(rows))
+    assert f"{column!r} goes forward in {forward} of {steps} steps and repeats in the others" in told
+    assert "rounded times do so: export them with more digits" in told
+    way = ("--column", f"ignored={column}", "--set", "rate=10 kHz")
+    (shot,) = campaign.read(run(tmp_path, content, *VELOCITY, *way)).shots
+    assert shot.force is not None
+    assert np.diff(shot.force.time_s) == pytest.approx(1e-4, rel=1e-4)
+
+
+@pytest.mark.parametrize("named", [(), ("--column", "time=t")])
+@pytest.mark.parametrize("head", ["t [s],force [N],position [m]", HEAD.replace("time", "t")])
+def test_a_file_whose_last_row_was_recorded_first_is_to_be_turned_round(
+    tmp_path: Path, head: str, named: tuple[str, ...]
+) -> None:
+    """A rate, or a column that numbers shots, was the way out, and made taps that go backwards."""
+    rows = [f"{t:.6g},{f:.6g},{x:.7g}" for t, f, x in zip(TIME, FORCE, PLACE, strict=True)]
+    told = refused(tmp_path, "\n".join([head, *rows[::-1]]), *VELOCITY, *named)
+    assert "runs backwards; turn the rows of the file round" in told
+    assert "rate" not in told
+    assert "shot=" not in told
 
 
 def test_times_that_go_back_are_those_of_several_shots(tmp_path: Path) -> None:

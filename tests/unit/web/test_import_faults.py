@@ -19,6 +19,11 @@ FILES = {
     "nothing named": "a;b\n1;2\n2;3\n3;5\n",
     "time as text": "Zeit;Kraft [N]\num eins;2\num zwei;3\num drei;5\n",
     "time to and fro": "Zeit [s];Kraft [N]\n1;2\n0;3\n3;5\n2;7\n",
+    "rounded time": "t [s];Kraft [N]\n" + "".join(f"0,{n // 9:03d};{n % 7}\n" for n in range(60)),
+    "time that repeats at times": "t [s];Kraft [N]\n"
+    + "".join(f"0,{n - n // 10:03d};{n % 7}\n" for n in range(60)),
+    "two records": "Zeit [s];Kraft [N]\n" + "".join(f"0,{n % 30:03d};{n % 7}\n" for n in range(60)),
+    "last row first": "Zeit [s];Kraft [N]\n" + "".join(f"0,{60 - n:03d};{n % 7}\n" for n in range(60)),
     "no unit": "Zeit [ms];Kraft [N];Weg\n0;0;0\n1;1;1\n2;0;2\n3;0;3\n",
     "time without a name": "a;Kraft [N]\n0;2\n0,25;3\n0,5;5\n0,75;7\n",
     "unit of something else": "Zeit [ms];Kraft [mm];Weg [mm]\n0;0;0\n1;1;1\n2;0;2\n3;0;3\n",
@@ -194,3 +199,11 @@ def test_taps_of_which_none_can_be_used_are_refused_in_german(tmp_path: Path) ->
     assert language == "de"
     assert said.endswith("m und federt zurück (Vorgleiten); stärker stoßen (und so in allen 3 Stößen)")
     assert page_fault(str(refused.value), "en") == ("en", str(refused.value))
+
+
+def test_a_time_that_was_named_and_runs_backwards_is_said_in_both_languages(tmp_path: Path) -> None:
+    given = read_given({"columns": ["time=Zeit"]})
+    (fault,) = faults_of(tmp_path, FILES["last row first"], given)
+    for language, said in (("en", "runs backwards; turn the rows"), ("de", "läuft rückwärts; die Zeilen")):
+        spoken, told = page_fault(fault, language)
+        assert (spoken, said in told) == (language, True)
