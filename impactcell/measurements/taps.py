@@ -14,7 +14,7 @@ from impactcell.measurements.given_values import Given
 from impactcell.measurements.measured_records import Record
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.numerics.spikes import noise_of
-from impactcell.records import Capture, Channel, Samples
+from impactcell.records import MM_PER_MIN, Capture, Channel, Samples
 
 START_STD = 10.0
 """Place of a part, in standard deviations of a sample, from which on the positions count from the table's
@@ -28,12 +28,13 @@ class _TapRecord:
     """One tap of a record.
 
     `onset` is the index of the first force sample in contact; None where contact is at the record's own
-    t = 0.
+    t = 0. The velocity may be `of_actuator`, from its own channel.
     """
 
     record: Record
     onset: int | None
     velocity_m_s: float
+    of_actuator: bool
 
 
 def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], list[str]]:
@@ -55,6 +56,7 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
     if len(taps) > len(records):
         told = "1 record" if len(records) == 1 else f"{len(records)} records"
         notes.append(f"{told} cut into {len(taps)} taps where the force begins anew")
+    notes += _of_actuator(taps)
     if left_out:
         told = (
             f"in {Path(left_out[0]).name}" if len(left_out) == 1 else f"the first in {Path(left_out[0]).name}"
@@ -140,7 +142,8 @@ def _with_velocity(
     for record, onset in parts:
         velocity = given.constants.get("velocity", record.scalars.get("velocity"))
         varies = isinstance(velocity, float) and math.isnan(velocity)
-        if (varies or not isinstance(velocity, float)) and ColumnMeaning.ACTUATOR in record.values:
+        of_actuator = (varies or not isinstance(velocity, float)) and ColumnMeaning.ACTUATOR in record.values
+        if of_actuator:
             velocity = _slope(record, onset)
         if not isinstance(velocity, float) or not abs(velocity) > 0.0:
             why = ": its column changes within the record, so it was measured" if varies else ""
@@ -150,8 +153,20 @@ def _with_velocity(
                 "--set 'velocity=3000 mm/min'"
             )
             continue
-        taps.append(_TapRecord(record, onset, abs(velocity)))
+        taps.append(_TapRecord(record, onset, abs(velocity), of_actuator))
     return taps
+
+
+def _of_actuator(taps: Sequence[_TapRecord]) -> list[str]:
+    """Tell velocities that nobody said."""
+    found = [tap.velocity_m_s / MM_PER_MIN for tap in taps if tap.of_actuator]
+    if not found:
+        return []
+    low, high = f"{min(found):.4g}", f"{max(found):.4g}"
+    velocity = low if low == high else f"{low} to {high}"
+    told = "1 tap" if len(found) == 1 else f"{len(found)} taps"
+    note = f"velocity {velocity} mm/min taken from the actuator channel about contact, in {told}"
+    return [f"{note} (--set velocity=... says otherwise)"]
 
 
 def _slope(record: Record, onset: int | None) -> float:

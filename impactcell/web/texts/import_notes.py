@@ -19,6 +19,10 @@ GERMAN: Final = {
         "die Position: beide scheinen vertauscht",
     r"given, and not used, for it is of taps: (.+)":
         r"angegeben und nicht verwendet, weil es nur für Stöße gilt: \1",
+    r"velocity (\S+) mm/min taken from the actuator channel about contact, in (\d+) taps?":
+        r"Geschwindigkeit \1 mm/min, aus dem Weg des Aktors um den Kontakt (Stöße: \2)",
+    r"velocity (\S+) to (\S+) mm/min taken from the actuator channel about contact, in (\d+) taps?":
+        r"Geschwindigkeit \1 bis \2 mm/min, aus dem Weg des Aktors um den Kontakt (Stöße: \3)",
     r"force turned: it was negative in compression": "Kraft umgekehrt: sie war bei Druck negativ",
     r"position summed up from the speed (['\"])(.+)\1, from 0 at the first sample of each record: where that "
     r"was is not known":

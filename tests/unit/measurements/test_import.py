@@ -30,7 +30,7 @@ from impactcell.measurements.units import split_unit
 from impactcell.prediction import estimate_from_features
 from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.web.texts.import_notes import page_note
-from tests.unit.measurements.records import PLACE_M, sampled, taps, write_logger_file
+from tests.unit.measurements.records import PLACE_M, PRETRIGGER_S, RATE_HZ, sampled, taps, write_logger_file
 
 
 @pytest.fixture(scope="module")
@@ -570,3 +570,33 @@ def test_a_comma_in_what_is_set_is_neither_a_decimal_mark_nor_a_separator(text: 
         read_given({}, trigger="1,500 N")
     with pytest.raises(MeasurementError, match="the gain of force is"):
         read_given({"gains": ["force=1,500 N/V"]})
+
+
+@pytest.mark.parametrize("head", ["", "velocity: 3000 mm/min\n\n"])
+def test_a_velocity_that_only_the_actuator_shows_is_told(tmp_path: Path, head: str) -> None:
+    """It was taken without a word, as no other guess is."""
+    struck = taps((2500, 4500), (18.9,))[::2]
+    for number, tap in enumerate(struck):
+        rng = np.random.default_rng(number)
+        onset = PRETRIGGER_S + np.random.default_rng(number).uniform(0.0, 1.0) / RATE_HZ
+        time, force, position = sampled(tap, rng)
+        ram = np.minimum(tap.velocity_m_s * (time - onset), tap.stroke_m)
+        rows = [
+            f"{t:.5f},{f:.4f},{x:.8f},{y:.9f}" for t, f, x, y in zip(time, force, position, ram, strict=True)
+        ]
+        text = "\n".join(["time [s],force [N],position [m],actuator [m]", *rows])
+        (tmp_path / f"{number}.csv").write_text(f"{head}{text}", encoding="utf-8")
+    tables = [table for file in sorted(tmp_path.iterdir()) for table in read_tables(file)]
+    imported = make_campaign(tables, guess(tables))
+    told = [note for note in imported.notes if "from the actuator channel" in note]
+    velocities = [shot.velocity_m_s * 6e4 for shot in imported.campaign.shots]
+    if head:
+        assert (velocities, told) == (pytest.approx([3000.0, 3000.0]), [])
+        return
+    assert velocities == pytest.approx([2500.0, 4500.0], rel=1e-5)
+    (note,) = told
+    assert note.startswith(
+        "velocity 2500 to 4500 mm/min taken from the actuator channel about contact, in 2 taps (--set "
+    )
+    german = "Geschwindigkeit 2500 bis 4500 mm/min, aus dem Weg des Aktors um den Kontakt (Stöße: 2)"
+    assert page_note(note, "de") == ("de", german)
