@@ -121,3 +121,20 @@ def test_a_shape_that_says_nothing_is_open(fits: MachineFits, model: FittedModel
     assert with_shape_intervals(fits, replace(model, fit=nothing)).shape_intervals == {
         RIPPLE.name: (0.0, math.inf)
     }
+
+
+def test_an_interval_of_a_strength_that_cannot_be_negative_begins_at_nought() -> None:
+    """Friction of which the records say next to nothing."""
+    base = replace(BASE, terms=(*BASE.terms, TermChoice("quadratic_drag"), TermChoice("stribeck_friction")))
+    fits = MachineFits(uniform_records(slides(), base), base, [], None)
+    terms = tuple(ChosenTerm(choice, fits.shapes[choice.name][0]) for choice in base.terms)
+    fit = fits.fit(fits.with_best_shapes(terms), settle=True)
+    told = with_shape_intervals(fits, fit).fit
+    for one in (fit.fit, told):
+        limited = np.array([column in fits.nonnegative for column in one.columns])
+        assert limited.sum() == 3
+        assert np.all(one.low[limited] >= 0.0)
+        assert np.any(one.low[limited] == 0.0)
+        assert np.all(one.high >= one.coefficients)
+    slopes = [column[0] == RIPPLE.name for column in told.columns]
+    assert np.any(told.low[slopes] < 0.0)

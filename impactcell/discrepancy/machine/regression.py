@@ -147,7 +147,15 @@ def fit_blocks(
     freedom = max(len(blocks) - len(columns), 1)
     spread = inverse @ (scores.T @ scores) @ inverse * len(blocks) / freedom
     half = student.ppf(0.975, freedom) * np.sqrt(np.maximum(np.diag(spread), 0.0))
-    return LinearFit(tuple(columns), coefficients, coefficients - half, coefficients + half, at_bound)
+    low = lower_ends(columns, coefficients - half, nonnegative)
+    return LinearFit(tuple(columns), coefficients, low, coefficients + half, at_bound)
+
+
+def lower_ends(columns: Sequence[Column], low: Samples, nonnegative: frozenset[Column]) -> Samples:
+    """Cut lower ends of intervals at 0 where a strength cannot be negative, shape (p,)."""
+    least = [0.0 if column in nonnegative else -math.inf for column in columns]
+    cut: Samples = np.maximum(low, least)
+    return cut
 
 
 def roughness_penalty(blocks: Blocks, columns: Sequence[Column], weight: float) -> Samples:

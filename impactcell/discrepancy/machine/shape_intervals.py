@@ -15,7 +15,7 @@ import numpy as np
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.nuisance_priors import OFFSET
-from impactcell.discrepancy.machine.regression import fit_blocks
+from impactcell.discrepancy.machine.regression import fit_blocks, lower_ends
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.weak_form import Column, Rows, build_rows
 from impactcell.records import Samples
@@ -36,10 +36,14 @@ def with_shape_intervals(fits: MachineFits, model: FittedModel) -> FittedModel:
     slopes = {_slope_column(term): _slope(rows, model, term) for term in shaped}
     training, _ = fits.blocks(fits.prepared(replace(rows, columns={**_columns(rows, model), **slopes})))
     free = fit_blocks(training, [*model.fit.columns, *slopes], fits.priors, fits.nonnegative)
-    half = 0.5 * (free.high - free.low)
+    half = free.high - free.coefficients
     strengths, logs = half[: len(model.fit.columns)], half[len(model.fit.columns) :]
     coefficients = model.fit.coefficients
-    fit = replace(model.fit, low=coefficients - strengths, high=coefficients + strengths)
+    fit = replace(
+        model.fit,
+        low=lower_ends(model.fit.columns, coefficients - strengths, fits.nonnegative),
+        high=coefficients + strengths,
+    )
     intervals = {
         term.choice.name: _interval(term.shape, float(log) if slope.any() else math.inf)
         for term, log, slope in zip(shaped, logs, slopes.values(), strict=True)
