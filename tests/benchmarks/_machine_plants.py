@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 QUIET = (0.02, 1e-5)
 DELAY = replace(SLIDE, delay_s=NumberPrior(0.0, 5e-3))
+SPRING_N_PER_M = 20.0
 KNOWN = {"coulomb_friction": COULOMB_N, "viscous_friction": VISCOUS_N_S_PER_M}
 """Strengths of every plant beside what is hidden in it."""
 
@@ -88,12 +89,16 @@ def plants() -> Iterator[Plant]:
             "slide, 250 Hz", hidden, lambda records=records, friction=friction: records(friction),  # type: ignore[misc]
             SLIDE, KNOWN | {hidden: strength},
         )  # fmt: skip
+    spring = KNOWN | {"restoring_force": SPRING_N_PER_M}
+    sprung = driven(spring_n_per_m=SPRING_N_PER_M)
+    yield Plant("slide, 250 Hz", "restoring_force", sprung, SLIDE, spring)
     base = replace(AXIS, terms=(TermChoice("coulomb_friction"),))
     yield Plant("axis that rests between its moves", "viscous_friction", axis, base, KNOWN)
     moves: list[tuple[str, float, Callable[[Samples, Samples], Samples]]] = [
         ("periodic_force", -0.2, lambda q, _: 0.2 * np.sin(2.0 * np.pi * q / 0.06)),
         ("directional_viscous_friction", 1.0, lambda _, v: np.abs(v)),
         ("position_dependent_friction", 0.8, lambda q, v: 0.8 * q * np.sign(v)),
+        ("restoring_force", SPRING_N_PER_M, lambda q, _: SPRING_N_PER_M * q),
     ]
     for hidden, strength, law in moves:
         yield Plant(

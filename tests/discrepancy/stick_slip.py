@@ -34,7 +34,13 @@ def levels(largest_n: float, hold_s: float, rng: np.random.Generator) -> Callabl
     return lambda time: drawn[np.floor(time / hold_s + 1e-9).astype(int)]
 
 
-def paths(drives: Samples, step_s: float, every: int, friction: Friction | None = None) -> Samples:
+def paths(
+    drives: Samples,
+    step_s: float,
+    every: int,
+    friction: Friction | None = None,
+    spring_n_per_m: float = 0.0,
+) -> Samples:
     """Positions of slides (samples, lanes) that drives (steps, lanes), held over a step each, lead to.
 
     Friction is an impulse that may stop a slide within a step and never turns it.
@@ -47,7 +53,7 @@ def paths(drives: Samples, step_s: float, every: int, friction: Friction | None 
         if number % every == 0:
             out.append(position)
         middle = position + 0.5 * step_s * speed
-        free = speed + step_s / MASS_KG * (drive - VISCOUS_N_S_PER_M * speed)
+        free = speed + step_s / MASS_KG * (drive - VISCOUS_N_S_PER_M * speed - spring_n_per_m * middle)
         left = np.abs(free) - step_s / MASS_KG * level(middle, speed)
         speed = np.sign(free) * np.maximum(left, 0.0)
         position = middle + 0.5 * step_s * speed
@@ -62,13 +68,15 @@ def slides(
     rate_hz: float = 250.0,
     duration_s: float = 12.0,
     count: int = 9,
+    spring_n_per_m: float = 0.0,
 ) -> Campaign:
     """Records of slides, with noise of force [N] and of position [m] that is not stated."""
     every = max(math.ceil(1.0 / (rate_hz * STEP_S)), 1)
     step = 1.0 / (rate_hz * every)
     drives = [drive_of(np.random.default_rng([3, number])) for number in range(1, count + 1)]
     middles = step * np.arange(0.5, round(duration_s / step))
-    moved = paths(np.stack([drive(middles) for drive in drives], axis=1), step, every, friction)
+    forces = np.stack([drive(middles) for drive in drives], axis=1)
+    moved = paths(forces, step, every, friction, spring_n_per_m)
     time = np.arange(len(moved)) / rate_hz
     rng = np.random.default_rng(11)
     shots = []

@@ -106,6 +106,7 @@ def test_notes_on_a_machine_are_said_in_german() -> None:
     alike = "periodic force, covariate friction(oil): on these records like inertia, gravity or drive, and so"
     beside = "covariate_friction(oil) shows only beside quadratic_drag, which hides it on these records;"
     off = "Simulated open loop, held-out records are 0.2 N m off with it, 0.1 without."
+    notes.append("restoring force: on these records like a constant force, and so not looked for.")
     notes += [f"{alike} not looked for.", f"{beside} quadratic_drag is not named.", off, DRIFTS]
     notes.append(f"{beside.replace('(oil)', '(oil temp)')} quadratic_drag is not named.")
     notes.append(

@@ -15,8 +15,10 @@ from impactcell.discrepancy.machine import (
     NumberPrior,
     Response,
     TermChoice,
+    establishing,
     investigate_machine,
 )
+from impactcell.discrepancy.machine.finding import Remainder
 from impactcell.discrepancy.machine.nuisance_priors import OFFSET
 from impactcell.discrepancy.machine.record_constants import constants_note, without_constants
 from impactcell.discrepancy.machine.weak_form import Rows
@@ -74,11 +76,22 @@ def test_what_is_found_is_the_same_whatever_the_constants(response: Response, co
         assert one.rmse == pytest.approx(other.rmse, rel=0.01)
 
 
+def test_none_are_told_where_nothing_remains(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of nothing any constant takes all."""
+    left = Remainder(math.nan, (), 0.0, 1.0)
+    monkeypatch.setattr(establishing, "remainder_of", lambda *_: left)
+    whole = replace(LACKING, terms=SLIDE.terms)
+    finding = investigate_machine(records(9, 0.0), whole)
+    assert finding.is_at_floor
+    assert finding.remainder is left
+    assert not [note for note in finding.notes if "of what remains" in note]
+
+
 def test_a_base_model_without_them_says_that_they_are_missing() -> None:
     whole = replace(LACKING, terms=SLIDE.terms)
     blind = found(whole, 9, SPREAD_N)
     assert blind.fall.after > 20.0
-    (note,) = constants_note(blind.remainder.constant_share, are_open=False)
+    (note,) = constants_note(blind.remainder.constant_share)
     assert note in blind.notes
     assert "9" in note.split("would take ")[1].split("%")[0]
     assert found(replace(whole, **BY_ITSELF), 9, SPREAD_N).is_at_floor  # type: ignore[arg-type]

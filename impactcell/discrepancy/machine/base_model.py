@@ -130,6 +130,16 @@ class BaseModel:
     name: str = "base"
 
     @property
+    def has_gravity(self) -> bool:
+        """Whether gravity acts, or may."""
+        return self.gravity_torque.value != 0.0 or not self.gravity_torque.is_held
+
+    @property
+    def has_free_offset(self) -> bool:
+        """Whether a constant force, or one of each record, is fitted whatever its size."""
+        return self.force_offset_by_record or math.isinf(self.force_offset.std)
+
+    @property
     def unit(self) -> str:
         """Unit of what is predicted."""
         is_rotation = self.coordinate is Coordinate.ROTATION

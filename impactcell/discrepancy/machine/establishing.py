@@ -1,26 +1,26 @@
 """What is established: terms selected on training blocks, and proved on held-out ones."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import takewhile
 
 from impactcell.discrepancy.machine.base_model import TermChoice
-from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
-from impactcell.discrepancy.machine.held_numbers import (
+from impactcell.discrepancy.machine.explained_by_numbers import (
+    absent_gravity_notes,
     blamed_on_number,
     explained_by,
     held_number_notes,
-    held_numbers,
-    sampling_step_s,
-    told_from_number,
 )
-from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine
+from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
+from impactcell.discrepancy.machine.held_numbers import held_numbers, sampling_step_s, told_from_number
+from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine, machine_parts
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
 from impactcell.discrepancy.machine.record_constants import constants_note
 from impactcell.discrepancy.machine.regression import Blocks
 from impactcell.discrepancy.machine.remainder import remainder_of
 from impactcell.discrepancy.machine.selection import SelectionStep, select_terms
+from impactcell.discrepancy.machine.shape_ends import with_ends_named
 from impactcell.discrepancy.machine.shape_intervals import with_shape_intervals
 from impactcell.discrepancy.machine.ties import still_tied
 from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch
@@ -51,14 +51,18 @@ def establish(
     enough = MachineFinding.enough(training, held_out)
     numbers = held_numbers(fits.base, sampling_step_s(fits.records))
     if enough:
+        parts = machine_parts(fits.base, is_driven=any(record.force.any() for record in fits.records))
         candidates = [
-            choice for choice in fits.candidates if not _is_like_the_machine(fits, training, choice)
+            choice
+            for choice in fits.candidates
+            if not _is_like_the_machine(fits, training, choice, parts.values())
         ]
-        notes = [*notes, *alike_note(fits.candidates, candidates)]
+        notes = [*notes, *alike_note(fits.candidates, candidates, parts)]
         search = _search(fits, training, candidates)
         steps = select_terms(search, fits.columns(base_terms))
         for number in numbers:
             steps = told_from_number(search, fits.columns(base_terms), steps, number)
+        steps = with_ends_named(steps, fits.shapes, fits.base.coordinate)
         notes += [step.note for step in steps if step.note]
     proposed = [step.accepted.term for step in steps if step.accepted is not None]
     proven = [*takewhile(lambda term: term.choice.name not in contradicted, proposed)]
@@ -71,6 +75,7 @@ def establish(
     training, held_out = fits.blocks()
     if falls:
         steps = _with_ties_of_now(_search(fits, training, candidates), fits.columns(base_terms), steps)
+        notes = [*notes, *absent_gravity_notes(steps)]
     nominal, final = models[0], models[-1]
     settled = training, held_out
     if falls and not fits.base.delay_s.is_held:
@@ -83,12 +88,7 @@ def establish(
         explained = [one for one in tried if one is not None]
         notes = [*notes, *held_number_notes(explained)]
         steps = blamed_on_number(steps, explained)
-    remainder = remainder_of(fits.rows(), final, fits.records)
-    notes = [
-        *notes,
-        *constants_note(remainder.constant_share, are_open=fits.base.force_offset_by_record),
-    ]
-    return MachineFinding(
+    finding = MachineFinding(
         base=fits.base,
         records=fits.records,
         steps=tuple(steps),
@@ -103,12 +103,15 @@ def establish(
         expected=expected_gap(settled[1], final),
         fall=fall_of_gap(held_out, nominal, final, seed, settled[1]),
         held_spans=fits.held_spans(),
-        remainder=remainder,
+        remainder=remainder_of(fits.rows(), final, fits.records),
         block_s=fits.block_s,
         scale=fits.scale,
         notes=tuple(notes),
         seed=seed,
     )
+    if finding.is_at_floor or fits.base.force_offset_by_record:
+        return finding
+    return replace(finding, notes=(*notes, *constants_note(finding.remainder.constant_share)))
 
 
 def _search(fits: MachineFits, training: Blocks, candidates: Sequence[TermChoice]) -> TermSearch:
@@ -142,13 +145,16 @@ def _with_ties_of_now(
     for step in steps:
         best, tied = step.accepted, step.tied_with
         if best is not None and tied:
-            tied = still_tied(search, columns, best, tied)
+            numbers = [name for name in tied if name not in search.shapes]
+            tied = (*still_tied(search, columns, best, tied), *numbers)
         told.append(replace(step, tied_with=tied))
         columns = [*columns, *(best.term.columns if best is not None else ())]
     return told
 
 
-def _is_like_the_machine(fits: MachineFits, training: Blocks, choice: TermChoice) -> bool:
-    """Whether a candidate at every value of its shape looks like inertia, gravity or drive."""
+def _is_like_the_machine(
+    fits: MachineFits, training: Blocks, choice: TermChoice, parts: Iterable[Column]
+) -> bool:
+    """Whether a candidate at every value of its shape looks like a part of the machine."""
     terms = [ChosenTerm(choice, shape) for shape in fits.shapes[choice.name]]
-    return all(like_the_machine(training, term) for term in terms)
+    return all(like_the_machine(training, term, parts, fits.base) for term in terms)

@@ -60,7 +60,8 @@ class _Change:
 
 def with_experiments(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
     """Add to a finding, for each two terms that it ties, the records that would tell them apart."""
-    ties = [(name, rival) for name, rivals in finding.tied_with.items() for rival in rivals]
+    known = {choice.name for choice in fits.candidates}
+    ties = [(name, rival) for name, rivals in finding.tied_with.items() for rival in rivals if rival in known]
     if not ties:
         return finding
     longest = _longest(finding)

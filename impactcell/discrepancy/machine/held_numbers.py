@@ -8,29 +8,40 @@ named, and against a law that nobody had listed.
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 from impactcell.campaign import Coordinate
-from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response
+from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
+from impactcell.discrepancy.machine.held_number_words import (
+    larger_or_smaller,
+    late_or_early,
+    more_or_less,
+    off_its_centre,
+    two_digits,
+)
 from impactcell.discrepancy.machine.regression import Blocks, fit_blocks
-from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, MIN_SHARE, SelectionStep
-from impactcell.discrepancy.machine.ties import MIN_TIED_SHARE, TIE_Z
-from impactcell.discrepancy.machine.trials import TermSearch, mean_over_error
+from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, SelectionStep
+from impactcell.discrepancy.machine.ties import MIN_TIED_SHARE, TIE_Z, tied_terms
+from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch, Trial, mean_over_error
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, Column
 from impactcell.records import Samples
 
 DELAY: Column = ("delay_s", 0.0, 0)
 """Column of how late the force was recorded: the force's derivative."""
-MOST = 0.5
-"""Share of what remains from which on a number that is off is what the headline tells [1]."""
 NEARLY_ALL = 0.9
-"""The same from which on a force recorded late or early, by however much, takes the place of a law [1]."""
+"""Share of what remains from which on a force recorded late or early, by however much, is no law."""
 FARTHEST_OFF_RAD = 0.05
 """Error of an angle, three degrees, beyond which no encoder that anybody uses turns off its centre."""
 FARTHEST_ANGLE_RAD = 0.5
 """Error of an angle beyond which a wave of it is not small."""
 FARTHEST_SHARE = 0.5
 """Share of a mass, a gain or a torque of gravity by which one who states it may be wrong."""
+INERTIA: Final = {
+    Coordinate.TRANSLATION: ("a", "mass", "mass_kg"),
+    Coordinate.ROTATION: ("an", "inertia", "inertia_kg_m2"),
+}
+"""What is inert, and its key in a base model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +65,10 @@ class HeldNumber:
     farthest : float
         Error beyond which it explains nothing, in the unit of its coefficients: a gain of nought would take
         all force out of a model.
+    is_absent : bool
+        The base model has none of it: a term that it explains as well is tied with it.
+    other_key : str
+        Where the base model would leave free what records do not tell from it; empty where there is nothing.
     """
 
     name: str
@@ -63,6 +78,13 @@ class HeldNumber:
     key: str
     largest: float = 0.0
     farthest: float = math.inf
+    is_absent: bool = False
+    other_key: str = ""
+
+    @property
+    def keys(self) -> str:
+        """Where the base model would leave it free, or what is not told from it."""
+        return f"{self.key} or {self.other_key}" if self.other_key else self.key
 
     @property
     def is_delay(self) -> bool:
@@ -83,7 +105,9 @@ class HeldNumber:
     @property
     def as_a_law(self) -> str:
         """Why no law is proposed that explains no more."""
-        return f"{self.phrase} does as well as any function of speed, load or position; {self.key} would tell"
+        return (
+            f"{self.phrase} does as well as any function of speed, load or position; {self.keys} would tell"
+        )
 
     @property
     def beside_a_law(self) -> str:
@@ -100,20 +124,6 @@ class HeldNumber:
         return changed
 
 
-@dataclass(frozen=True, slots=True)
-class Explained:
-    """Coefficients of a number that is off, beside a model, and the share of what remains it explains."""
-
-    number: HeldNumber
-    coefficients: tuple[float, ...]
-    share: float
-
-    @property
-    def words(self) -> str:
-        """What would explain how much."""
-        return f"{self.number.sized(self.coefficients)} would explain {100.0 * self.share:.0f} %"
-
-
 def held_numbers(base: BaseModel, sample_s: float) -> tuple[HeldNumber, ...]:
     """List the numbers that a base model holds and that records could tell.
 
@@ -127,73 +137,78 @@ def held_numbers(base: BaseModel, sample_s: float) -> tuple[HeldNumber, ...]:
     unit = "N m" if turns else "N"
     numbers = [
         HeldNumber(
-            "delay_s", (DELAY,), "a force recorded late or early", _late_or_early,
+            "delay_s", (DELAY,), "a force recorded late or early", late_or_early,
             _nuisance("delay_s: {std: SECONDS}"),
             sample_s,
         ),
         HeldNumber(
             "force_offset", (_column("force_offset"),), "a constant force",
-            lambda size: f"a constant force of {_digits(size[0])} {unit}", _nuisance("force_offset"),
+            lambda size: f"a constant force of {two_digits(size[0])} {unit}", _nuisance("force_offset"),
         ),
     ]  # fmt: skip
     if base.response is Response.FORCE or base.inertia.is_held:  # else without any force nothing is left
-        numbers.append(
-            HeldNumber(
-                "force_gain", (_column("force_gain"),), "another gain of the force",
-                lambda size: f"a gain of the force {_percent(size[0])}", _nuisance("force_gain"),
-                farthest=FARTHEST_SHARE,
-            )
-        )  # fmt: skip
+        numbers.append(_gain_of_force(base))
     if turns:
         numbers += [
             HeldNumber(
                 "position_eccentricity", tuple((ECCENTRICITY, 0.0, number) for number in range(2)),
-                "an encoder that turns off its centre", _off_its_centre, _nuisance("position_eccentricity"),
+                "an encoder that turns off its centre", off_its_centre, _nuisance("position_eccentricity"),
                 FARTHEST_OFF_RAD, FARTHEST_ANGLE_RAD,
             ),
             HeldNumber(
                 "position_offset", (_column("position_offset"),), "a zero of the angle that is off",
-                lambda size: f"a zero of the angle {_digits(1e3 * abs(size[0]))} mrad off",
+                lambda size: f"a zero of the angle {two_digits(1e3 * abs(size[0]))} mrad off",
                 _nuisance("position_offset"), FARTHEST_OFF_RAD, FARTHEST_ANGLE_RAD,
             ),
             HeldNumber(
                 "gravity_torque", (_column("gravity_torque"),), "another torque of gravity",
-                lambda size: f"a torque of gravity {_more_or_less(size[0], unit)}",
+                lambda size: f"a torque of gravity {more_or_less(size[0], unit)}",
                 "a free gravity_torque_n_m in the base model",
                 farthest=FARTHEST_SHARE * abs(base.gravity_torque.value) or math.inf,
+                is_absent=not base.has_gravity,
             ),
         ]  # fmt: skip
-    if base.response is Response.FORCE and base.inertia.value > 0.0:
-        word, key = ("inertia", "inertia_kg_m2") if turns else ("mass", "mass_kg")
+    if base.response is Response.FORCE and base.inertia.value > 0.0 and not _is_one_scale(base):
+        article, word, key = INERTIA[base.coordinate]
         numbers.append(
             HeldNumber(
                 "inertia", (_column("inertia"),), f"another {word}",
-                lambda size: f"{'an' if turns else 'a'} {word} {_percent(size[0])}",
+                lambda size: f"{article} {word} {larger_or_smaller(size[0])}",
                 f"a free {key} in the base model", farthest=FARTHEST_SHARE,
             )
         )  # fmt: skip
     return tuple(one for one in numbers if _is_held(base, one.name))
 
 
+def _gain_of_force(base: BaseModel) -> HeldNumber:
+    """Gain of the force, which is the inertia as well where one scales everything else that is free."""
+    gain = HeldNumber(
+        "force_gain", (_column("force_gain"),), "another gain of the force",
+        lambda size: f"a gain of the force {larger_or_smaller(size[0])}", _nuisance("force_gain"),
+        farthest=FARTHEST_SHARE,
+    )  # fmt: skip
+    if not (_is_one_scale(base) and base.inertia.is_held and base.inertia.value > 0.0):
+        return gain
+
+    def of_inertia(relative: float) -> float:
+        # A force that is predicted grows with the inertia; from a force that is given the motion falls.
+        return relative if base.response is Response.FORCE else 1.0 / (1.0 + relative) - 1.0
+
+    article, word, key = INERTIA[base.coordinate]
+    return replace(
+        gain,
+        phrase=f"{gain.phrase} or another {word}",
+        sized=lambda size: (
+            f"{gain.sized(size)}, or {article} {word} {larger_or_smaller(of_inertia(size[0]))} "
+            "(these records do not tell which)"
+        ),
+        other_key=f"a free {key}",
+    )
+
+
 def sampling_step_s(records: Iterable[UniformRecord]) -> float:
     """Longest time between two samples of position or force as they were recorded [s]."""
     return max(record.finer * record.force_span * record.step_s for record in records)
-
-
-def explained_by(search: TermSearch, columns: Sequence[Column], number: HeldNumber) -> Explained | None:
-    """Say what a number that is off would explain of what a model leaves.
-
-    None where it does not hold from block to block, or explains little.
-    """
-    before = search.losses(columns)
-    gains = before - search.losses([*columns, *number.columns])
-    excess = float(before.sum() - search.blocks.noise.sum())
-    if not (_hold(search, gains, before) and gains.sum() >= MIN_SHARE * excess > 0.0):
-        return None
-    coefficients = fitted(search.blocks, columns, number, search.priors, search.nonnegative)
-    if math.hypot(*coefficients) > number.farthest:
-        return None
-    return Explained(number, coefficients, min(float(gains.sum()) / excess, 1.0))
 
 
 def fitted(
@@ -219,41 +234,34 @@ def told_from_number(
 ) -> list[SelectionStep]:
     """Refuse the first step of a selection where a number that is off would explain clearly more, or as much.
 
-    The latter only if it is a sensor's, and so small that nobody can exclude it.
+    The latter only if it is a sensor's, and so small that nobody can exclude it. One that the base model has
+    none of is tied.
     """
     if not steps or (best := steps[0].accepted) is None:
         return steps
     before = search.losses(columns)
     gains = before - search.losses([*columns, *number.columns])
-    if not (_hold(search, gains, before) and does_as_well(gains, best.gains, MIN_TIED_SHARE)):
+    if not (hold(search, gains, before) and does_as_well(gains, best.gains, MIN_TIED_SHARE)):
         return steps
     size = math.hypot(*fitted(search.blocks, columns, number, search.priors, search.nonnegative))
     if size <= number.farthest and mean_over_error(gains - best.gains) >= TIE_Z:
         return [replace(steps[0], accepted=None, tied_with=(), reason=number.better)]
+    if number.is_absent:
+        rival = ChosenTerm(TermChoice(number.name), 0.0)
+        trial = Trial(rival, gains, search.shares(gains, before), at_end=False)
+        tied = (*steps[0].tied_with, *tied_terms(search, before, best, [trial]))
+        return [replace(steps[0], tied_with=tied), *steps[1:]]
     if size > number.largest:
         return steps
     return [replace(steps[0], accepted=None, tied_with=(), reason=number.as_well)]
 
 
-def held_number_notes(explained: Sequence[Explained]) -> list[str]:
-    """Say what numbers that the base model holds would explain, each by itself: those that explain most."""
-    most = max((one.share for one in explained), default=0.0)
-    return [
-        f"A{one.words[1:]} of what remains: {one.number.key} finds it with everything else."
-        for one in explained
-        if one.share >= MIN_TIED_SHARE * most
-    ]
+def _is_one_scale(base: BaseModel) -> bool:
+    """Whether gain and inertia are one number: no force of known size acts."""
+    return not base.has_gravity or math.isinf(base.gravity_torque.std)
 
 
-def blamed_on_number(steps: list[SelectionStep], explained: Sequence[Explained]) -> list[SelectionStep]:
-    """Give as the reason why no term was taken the number that would explain most of what remains."""
-    most = max(explained, key=lambda one: one.share, default=None)
-    if most is None or most.share < MOST or not steps or steps[0].accepted is not None:
-        return steps
-    return [replace(steps[0], reason=f"{most.words} of it"), *steps[1:]]
-
-
-def _hold(search: TermSearch, gains: Samples, before: Samples) -> bool:
+def hold(search: TermSearch, gains: Samples, before: Samples) -> bool:
     """Whether gains hold from block to block, as those of a term have to."""
     return max(mean_over_error(gains), mean_over_error(search.shares(gains, before))) >= MIN_GAIN_Z
 
@@ -269,24 +277,3 @@ def _column(name: str) -> Column:
 
 def _nuisance(name: str) -> str:
     return f"{name} among the nuisances of the base model"
-
-
-def _late_or_early(coefficients: Sequence[float]) -> str:
-    (delay_s,) = coefficients
-    return f"a force recorded {_digits(1e3 * abs(delay_s))} ms {'late' if delay_s > 0.0 else 'early'}"
-
-
-def _off_its_centre(coefficients: Sequence[float]) -> str:
-    return f"an encoder that turns {_digits(1e3 * math.hypot(*coefficients))} mrad off its centre"
-
-
-def _percent(relative: float) -> str:
-    return f"{_digits(100.0 * abs(relative))} % {'larger' if relative > 0.0 else 'smaller'}"
-
-
-def _more_or_less(value: float, unit: str) -> str:
-    return f"{_digits(abs(value))} {unit} {'larger' if value > 0.0 else 'smaller'}"
-
-
-def _digits(value: float) -> str:
-    return f"{float(f'{value:.2g}'):g}"

@@ -91,8 +91,7 @@ def drifts(base: BaseModel) -> bool:
 
 def pulls_back(base: BaseModel) -> bool:
     """Whether the base model has what brings a part back to a place: gravity, or a spring."""
-    has_gravity = not base.gravity_torque.is_held or base.gravity_torque.value != 0.0
-    return has_gravity or any(choice.identifier in PULLING_BACK for choice in base.terms)
+    return base.has_gravity or any(choice.identifier in PULLING_BACK for choice in base.terms)
 
 
 def constant_forces(

@@ -250,8 +250,7 @@ def _notes_of_columns_with_gaps(records: Sequence[UniformRecord]) -> list[str]:
 
 def _has_load(base: BaseModel) -> bool:
     """Whether what gear or guide carries is known otherwise than by the force that is predicted."""
-    gravity = base.gravity_torque
-    return base.response is Response.POSITION or gravity.value != 0.0 or not gravity.is_held
+    return base.response is Response.POSITION or base.has_gravity
 
 
 def _held_records(records: Sequence[UniformRecord], train: str | None, test: str | None) -> set[int] | None:

@@ -58,7 +58,10 @@ MOST_FREED = 3
 """Numbers that the base model holds, and beside which a law is looked for."""
 BY_LOAD = TermChoice("load_dependent_friction")
 """Not looked for where it looks like the drive: any law over the load can cancel that then."""
-NOTHING_HELPS = "no function of speed, load or position helps block after block that it was not fitted to"
+NOTHING_HELPS = (
+    f"no function of speed, load or position that a spline of {SPLINE_PIECES} pieces can follow helps block "
+    "after block that it was not fitted to"
+)
 """Why no law is proposed where no spline holds."""
 
 

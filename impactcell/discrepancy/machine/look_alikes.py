@@ -1,44 +1,69 @@
 """Terms that look like inertia, gravity or drive on the records there are, and places that look like time."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from impactcell.discrepancy.machine.base_model import TermChoice
-from impactcell.discrepancy.machine.regression import Blocks
+from impactcell.discrepancy.machine.base_model import BaseModel, TermChoice
+from impactcell.discrepancy.machine.nuisance_priors import OFFSET
+from impactcell.discrepancy.machine.regression import RIDGE, Blocks
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import Column
+from impactcell.german.findings import enumerated
 from impactcell.physics.effect_names import in_words
 
-MACHINE: tuple[Column, ...] = tuple(
-    (name, 0.0, 0) for name in ("inertia", "gravity_torque", "force_gain", "force_offset")
-)
-"""Columns of the machine itself."""
 MAX_ALIKE = 0.95
-"""Squared correlation with inertia, gravity or drive from which on a term cannot be told from it [1]."""
+"""Squared correlation with a part of the machine from which on a term cannot be told from it [1]."""
 
 ONE_WAY = 0.95
 """Share of a record's path that lies between its ends where it goes one way [1]."""
 
 
-def like_the_machine(blocks: Blocks, term: ChosenTerm) -> bool:
-    """Whether a term looks like inertia, gravity or drive: what is wrong with those would be named by it."""
-    own = blocks.places(MACHINE)
+def machine_parts(base: BaseModel, *, is_driven: bool) -> dict[str, Column]:
+    """Columns of what a machine has anyway, by name: what is wrong there would be named by a term like it.
+
+    No gravity is wrong that a base model does not have. Where nothing drives either, the inertia is the unit
+    of every force. A constant force that is free is fitted.
+    """
+    parts: dict[str, Column] = {}
+    if is_driven or base.has_gravity:
+        parts["inertia"] = ("inertia", 0.0, 0)
+    if base.has_gravity:
+        parts["gravity"] = ("gravity_torque", 0.0, 0)
+    parts["drive"] = ("force_gain", 0.0, 0)
+    if not base.has_free_offset:
+        parts["a constant force"] = OFFSET
+    return parts
+
+
+def like_the_machine(blocks: Blocks, term: ChosenTerm, parts: Iterable[Column], base: BaseModel) -> bool:
+    """Whether a term looks like a part of the machine.
+
+    Beside a constant force that is free: from where a position is counted does not matter then.
+    """
     places = blocks.places(term.columns)
     total = blocks.products.sum(axis=0)
-    tiny = np.finfo(float).tiny
-    size = np.outer(np.diag(total)[own], np.diag(total)[places]) + tiny
+    whole = np.diag(total)[places]
+    if math.isinf(base.force_offset.std):
+        (offset,) = blocks.places([OFFSET])
+        total = total - np.outer(total[:, offset], total[offset]) / total[offset, offset]
+    own, left = blocks.places(parts), np.diag(total)[places]
+    size = np.outer(np.diag(total)[own], left) + np.finfo(float).tiny
     alike = total[np.ix_(own, places)] ** 2 / size
-    return bool(np.all(alike.max(axis=0) >= MAX_ALIKE))
+    return bool(np.all((alike.max(axis=0) >= MAX_ALIKE) | (left < RIDGE * whole)))
 
 
-def alike_note(candidates: Sequence[TermChoice], kept: Sequence[TermChoice]) -> list[str]:
+def alike_note(
+    candidates: Sequence[TermChoice], kept: Sequence[TermChoice], parts: Mapping[str, Column]
+) -> list[str]:
     """Say which terms are not looked for."""
     names = [in_words(choice.name) for choice in candidates if choice not in kept]
     if not names:
         return []
-    return [f"{', '.join(names)}: on these records like inertia, gravity or drive, and so not looked for."]
+    like = enumerated([*parts], "or")
+    return [f"{', '.join(names)}: on these records like {like}, and so not looked for."]
 
 
 def one_way_note(records: Sequence[UniformRecord]) -> list[str]:

@@ -44,9 +44,9 @@ def without_constants(rows: Rows, part: IndexArray, weight: Samples | None = Non
     )
 
 
-def constants_note(share: float, *, are_open: bool) -> list[str]:
-    """Say what constants of each record would take of what remains, where the base model has none."""
-    if are_open or share < MOST:
+def constants_note(share: float) -> list[str]:
+    """Say what constants of each record would take of what remains, if it is most of it."""
+    if share < MOST:
         return []
     note = (
         f"A constant force of its own in each record would take {100.0 * share:.0f} % of what remains: "

@@ -33,6 +33,8 @@ MIN_SECOND_GAP = 2.0
 """Gap in noise floors beside the first term from which on a second one is named [1]."""
 NOT_IN_EVERY_BLOCK = "no term does better in block after block that it was not fitted to"
 """Why the best term is not taken where its gain scatters too much from block to block."""
+END_OF_RANGE = "the shape of the best term came to the end of its range"
+"""Why it is not taken where another value of its shape, beyond those that are tried, may do better."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -165,7 +167,7 @@ def _refusal(best: Trial, free_gains: Mapping[str, float], gain_of_all: float, e
     if best.gain < MIN_SHARE_OF_ALL * gain_of_all:
         return "no term stands out from what all of them close together"
     if best.at_end:
-        return "the shape of the best term came to the end of its range"
+        return END_OF_RANGE
     free = free_gains.get(PLACES.get(best.term.choice.identifier, ""), -math.inf)
     if best.gain < MIN_SHARE_OF_FREE * free:
         return "a free form in the same place does much better than any named term"

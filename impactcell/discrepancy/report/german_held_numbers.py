@@ -11,6 +11,8 @@ PHRASES: Final = {
     ),
     "a constant force": "eine konstante Kraft",
     "another gain of the force": "eine andere Verstärkung der Kraft",
+    "another gain of the force or another inertia": "eine andere Verstärkung der Kraft oder Trägheit",
+    "another gain of the force or another mass": "eine andere Verstärkung der Kraft oder Masse",
     "an encoder that turns off its centre": "ein Drehgeber, der außermittig sitzt,",
     "a zero of the angle that is off": "ein verschobener Nullpunkt des Winkels",
     "another torque of gravity": "ein anderes Schweremoment",
@@ -26,6 +28,8 @@ SIZED: Final[tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...]] = (
     (r"a constant force of (\S+ N(?: m)?)", r"eine konstante Kraft von \1"),
     (r"a gain of the force (\S+) % (larger|smaller)",
      lambda m: f"eine um {m[1]} % {_larger(m[2], 'e')} Verstärkung der Kraft"),
+    (r"(a gain of the force .+), or (an? .+) \(these records do not tell which\)",
+     lambda m: f"{held_number(m[1])} oder {held_number(m[2])} (diese Messungen sagen nicht, welche)"),
     (r"an encoder that turns (\S+) mrad off its centre", r"ein Drehgeber, der \1 mrad außermittig sitzt,"),
     (r"a zero of the angle (\S+) mrad off", r"ein um \1 mrad verschobener Nullpunkt des Winkels"),
     (r"a torque of gravity (\S+) N m (larger|smaller)",
@@ -49,11 +53,14 @@ def held_number(english: str) -> str:
 
 def key_of(english: str) -> str:
     """Say where a base model would leave a number free; empty where that is not known."""
+    one, _, other = english.partition(" or ")
+    if other:
+        return f"{key_of(one)} oder {key_of(other)}"
     if match := re.fullmatch(r"(\w+)(: \{std: SECONDS\})? among the nuisances of the base model", english):
         within = ": {std: SEKUNDEN}" if match[2] else ""
         return f"{match[1]}{within} unter den nuisances des Grundmodells"
-    match = re.fullmatch(r"a free (\w+) in the base model", english)
-    return f"ein freies {match[1]} im Grundmodell" if match else ""
+    match = re.fullmatch(r"a free (\w+)( in the base model)?", english)
+    return f"ein freies {match[1]}{' im Grundmodell' if match[2] else ''}" if match else ""
 
 
 def _larger(english: str, ending: str) -> str:

@@ -12,6 +12,7 @@ from impactcell.discrepancy.report.german_held_numbers import held_number, key_o
 from impactcell.discrepancy.report.german_words import phrase, term_name
 from impactcell.german.data_faults import german_data_fault, german_message
 from impactcell.german.findings import with_decimal_commas
+from impactcell.german.parameters import words_of
 from impactcell.physics.effect_names import as_title, identifier_of
 
 Patterns = Sequence[tuple[str, str | Callable[[re.Match[str]], str]]]
@@ -28,6 +29,15 @@ DOUBTED: Final = {
 """What may be otherwise than a record has it."""
 LIKE: Final = {"velocity": "", "mass": "; eine Kraft mit falschem Maßstab sähe ebenso aus"}
 """What looks the same."""
+SIZES: Final = {"smallest": "kleinsten", "largest": "größten"}
+"""Which end of what is looked for."""
+PARTS: Final = {
+    "inertia": "Trägheit",
+    "gravity": "Schwerkraft",
+    "drive": "Antrieb",
+    "a constant force": "eine konstante Kraft",
+}
+"""What every machine has."""
 RATIOS: Final = {
     "the part's speed over the actuator's velocity":
         "die Geschwindigkeit des Teils durch die des Antriebs",
@@ -150,9 +160,8 @@ NOTES: Final[Patterns] = (
     (r"Inertia, gravity and gain of the force are all free: .*",
      ("Trägheit, Schwerkraft und Verstärkung der Kraft sind alle frei: Die Trägheit bleibt fest, als Einheit "
       "von allem.")),
-    (r"(.+): on these records like inertia, gravity or drive, and so not looked for\.",
-     lambda m: f"{_terms(m[1])}: auf diesen Messungen wie Trägheit, Schwerkraft oder Antrieb, darum nicht "
-     "gesucht."),
+    (r"(.+): on these records like (.+), and so not looked for\.",
+     lambda m: f"{_terms(m[1])}: auf diesen Messungen wie {_parts(m[2])}, darum nicht gesucht."),
     ((r"(.+): held-out blocks want it, but simulated open loop, held-out records are (\S+ .+?) off with it, "
       r"(\S+) without; it is not named\."),
      lambda m: f"{_terms(m[1])}: Zurückgehaltene Blöcke wollen es, aber ohne Rückführung simuliert liegen "
@@ -160,6 +169,9 @@ NOTES: Final[Patterns] = (
     (r"(.+?) shows only beside (.+), which hides it on these records; .*",
      lambda m: f"{term_name(m[1])} zeigt sich nur neben „{term_name(m[2])}“, das es auf diesen Messungen "
      f"verdeckt; „{term_name(m[2])}“ wird nicht genannt."),
+    (r"Where gravity acts, (\w+) is free in the base model; wider angles tell it from (.+)\.",
+     lambda m: f"Wo die Schwerkraft wirkt, ist {m[1]} im Grundmodell frei; größere Winkel unterscheiden sie "
+     f"von „{_terms(m[2])}“."),
     (r"Every record goes one way: a function of position is one of the time .*",
      ("Jede Messung geht nur in eine Richtung: Eine Funktion des Ortes ist auch eine der Zeit seit ihrem "
       "Beginn, und diese Messungen unterscheiden sie kaum.")),
@@ -194,13 +206,15 @@ REASONS: Final[Patterns] = (
     (r"the columns? ([^;]+) had fewer than (\d+) different values, [^;]*",
      lambda m: f"zu wenig verschiedene Werte für eine Funktion (unter {m[2]}) hatte: "
      f"{m[1].replace(' and ', ' und ')}"),
-    (r"no function of speed, load or position helps block after block that it was not fitted to",
-     ("keine Funktion von Geschwindigkeit, Last oder Ort hilft in einem Block um den anderen, der nicht "
-      "angepasst wurde")),
+    ((r"no function of speed, load or position that a spline of (\d+) pieces can follow helps block after "
+      r"block that it was not fitted to"),
+     (r"keine Funktion von Geschwindigkeit, Last oder Ort, der ein Spline aus \1 Stücken folgen kann, hilft "
+      r"in einem Block um den anderen, der nicht angepasst wurde")),
     (r"(an?\w* .+) does as well as any function of speed, load or position",
      lambda m: f"{said} erklärt es so gut wie jede Funktion von Geschwindigkeit, Last oder Ort"
      if (said := held_number(m[1])) else ""),
-    (r"(\w+[^;]* among the nuisances of the base model|a free \w+ in the base model) would tell",
+    ((r"(\w+[^;]* among the nuisances of the base model(?: or a free \w+)?|a free \w+ in the base model) "
+      r"would tell"),
      lambda m: f"{key_of(m[1])} zeigte es"),
     (r"simulated open loop, the law that fits best errs no less on held-out records than no law",
      "ohne Rückführung simuliert irrt das beste Gesetz an Zurückgehaltenem nicht weniger als keines"),
@@ -221,8 +235,9 @@ REASONS: Final[Patterns] = (
      lambda m: f"{said} erklärte {m[2]} % davon" if (said := held_number(m[1])) else ""),
     (r"no term stands out from what all of them close together",
      "kein Term hebt sich von dem ab, was alle zusammen schließen"),
-    (r"the shape of the best term came to the end of its range",
-     "die Form des besten Terms kam an das Ende ihres Bereichs"),
+    (r"(.+) comes nearest, at a (.+) of (\S+) (\S+), the (smallest|largest) that is looked for",
+     lambda m: f"„{term_name(identifier_of(m[1]))}“ kommt am nächsten, mit {m[3]} {m[4]} "
+     f"({words_of(identifier_of(m[2]), 'de')}), dem {SIZES[m[5]]} Wert, der gesucht wird"),
     (r"a free form in the same place does much better than any named term",
      "eine freie Form an derselben Stelle ist viel besser als jeder benannte Term"),
     (r"beside a remainder one term is named at most",
@@ -265,6 +280,13 @@ def _of(english: str, patterns: Patterns) -> str | None:
 
 def _terms(names: str) -> str:
     return ", ".join(term_name(identifier_of(name)) for name in names.split(", "))
+
+
+def _parts(english: str) -> str:
+    """Name parts of a machine in a row."""
+    for part, german in (PARTS | {" or ": " oder "}).items():
+        english = english.replace(part, german)
+    return english
 
 
 def _quantities(english: str) -> str:

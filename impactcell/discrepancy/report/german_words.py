@@ -36,6 +36,7 @@ TERMS: Final = {
     "covariate_force": "Kraft je Einflussgröße",
     "periodic_force": "Periodische Kraft",
     "hardening_spring": "Verhärtende Feder",
+    "gravity_torque": "Schweremoment",
     "presliding_hysteresis": "Hysterese vor dem Gleiten",
     "friction_over_speed": "Reibung über der Geschwindigkeit",
     "friction_over_load": "Reibung über der Last",
