@@ -67,6 +67,10 @@ def test_the_constant_force_of_each_lane_is_found() -> None:
     assert constant_forces(run, lanes, np.zeros(2), math.inf) == pytest.approx(truth, abs=1e-9)
     assert constant_forces(run, lanes, np.zeros(2), 0.4) == pytest.approx([0.4, -0.4])
     assert constant_forces(run, lanes, np.zeros(2), 0.0) == pytest.approx([0.0, 0.0])
+    resting = ([np.zeros(50), np.full(50, 9.0)], measured)
+    assert constant_forces(run, resting, np.zeros(2), math.inf) == pytest.approx(truth, abs=1e-9)
+    free = ([np.zeros(50), np.zeros(50)], measured)
+    assert constant_forces(run, free, np.array([0.1, 0.2]), math.inf) == pytest.approx([0.1, 0.2])
 
 
 @pytest.mark.parametrize(

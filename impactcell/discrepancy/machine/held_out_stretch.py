@@ -103,6 +103,8 @@ def constant_forces(
 ) -> Samples:
     """Constant force of each lane by least squares of its positions, shape (lanes,).
 
+    Where nothing drives at all it stays where it begins: friction alone moves nothing, and takes it.
+
     Parameters
     ----------
     run : callable
@@ -118,7 +120,10 @@ def constant_forces(
     """
     drives, measured = drives_and_measured
     lanes = len(measured)
-    nudge = OFFSET_NUDGE * np.array([float(np.abs(drive).max()) for drive in drives])
+    largest = np.array([float(np.abs(drive).max()) for drive in drives])
+    if not largest.any():
+        return constant
+    nudge = OFFSET_NUDGE * np.where(largest > 0.0, largest, largest.max())
     best, least = constant, np.full(lanes, np.inf)
     for _ in range(steps):
         both = run(np.concatenate([constant, constant + nudge]))
