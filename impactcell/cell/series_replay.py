@@ -119,7 +119,15 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
     notes: list[tuple[int, str]] = []
     result: TrackingResult | None = None
     used, open_shift = 0, -1
-    for observation in series_runs.told_apart(observations, settings.reorder_limit):
+    wrong = series_runs.misnumbered(observations, settings.reorder_limit)
+    numbered = [observation for place, observation in enumerate(observations) if place not in wrong]
+    in_runs = iter(series_runs.told_apart(numbered, settings.reorder_limit))
+    for place, given in enumerate(observations):
+        if place in wrong:
+            notes.append((given.cycle, wrong[place]))
+            course.append((given.cycle, *course[-1][1:]))
+            continue
+        observation = replace(next(in_runs), number_is_sure=place < len(observations) - 1)
         result = wear_batch.update(settings, state, observation)
         state = result.state
         used += result.used

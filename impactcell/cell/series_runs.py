@@ -1,13 +1,15 @@
-"""Runs of a series whose cycles are counted anew: rows that come again with other values are no copies.
+"""What the numbers of a series say: runs whose cycles are counted anew, and numbers that are wrong.
 
 A module says itself that it has restarted; a file says it only by its numbers. By these alone a run of up to
-`TrackerSettings.reorder_limit` cycles would be the one before come twice, and be left out.
+`TrackerSettings.reorder_limit` cycles would be the one before come twice, and be left out. A wrong number is
+known by those around it: without them it would be cycles that were not measured, and a restart after them.
 """
 
 import math
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from impactcell.errors import SeriesError
 from impactcell.tracking.wear_batch import FrictionObservation
@@ -17,6 +19,19 @@ FEWEST_REPEATS = 3
 MOST_OTHERS = 0.5
 """Share of them with another value from which on they are a run: a run has few values of the one before, by
 rounding, a copy none of its own."""
+
+
+def misnumbered(observations: Sequence[FrictionObservation], reorder_limit: int) -> dict[int, str]:
+    """Places at which one number is far from both beside it, which go on in their order; each with a note."""
+    found: dict[int, str] = {}
+    before = observations[0].cycle if observations else 0
+    for place, (here, following) in enumerate(pairwise(observations[1:]), 1):
+        cycle, after = here.cycle, following.cycle
+        if before < after and not before - reorder_limit <= cycle <= after + reorder_limit:
+            found[place] = f"stands between cycles {before} and {after}, not used: correct its number"
+        else:
+            before = cycle
+    return found
 
 
 def told_apart(observations: Sequence[FrictionObservation], reorder_limit: int) -> list[FrictionObservation]:

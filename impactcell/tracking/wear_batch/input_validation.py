@@ -57,19 +57,31 @@ class CycleClock:
 
 @dataclass(frozen=True, slots=True)
 class CycleTiming:
-    """Where a cycle belongs: `passed` cycles after the newest one, or `lag` cycles before it."""
+    """Where a cycle belongs: `passed` cycles after the newest one, or `lag` cycles before it.
+
+    That is not known of one that is `doubted`: its number may be wrong.
+    """
 
     index: int
     passed: int
     lag: int
     repeated: bool
     note: str = ""
+    doubted: bool = False
 
 
 def update_clock(
-    clock: CycleClock, cycle: int, time_ns: int, reorder_limit: int, session: int = 0
+    clock: CycleClock,
+    cycle: int,
+    time_ns: int,
+    reorder_limit: int,
+    session: int = 0,
+    farthest: float = math.inf,
 ) -> tuple[CycleClock, CycleTiming]:
     """Find where a cycle belongs and move the clock there.
+
+    A number that is too far ahead is in doubt, and does not move the clock: the next cycle does, past all
+    that lie between, where it goes on from that number.
 
     Parameters
     ----------
@@ -78,6 +90,8 @@ def update_clock(
         those of a module that counts anew.
     session : int
         The module's; another one than before says that it counts anew, 0 says nothing.
+    farthest : float
+        Cycles ahead beyond which a number is in doubt.
     """
     index, session = cycle + clock.base, session or clock.session
     if not clock.seen:
@@ -88,11 +102,17 @@ def update_clock(
     if not is_new_session and (index == clock.last or index in clock.seen):
         note = f"cycle {cycle} came twice, the second is ignored"
         return clock, CycleTiming(index, 0, 0, repeated=True, note=note)
-    seen = clock.seen[-reorder_limit:]
+    seen, newest = clock.seen[-reorder_limit:], clock.seen[-1]
     if not is_new_session and 0 < lag <= reorder_limit:
         clock = replace(clock, seen=(*seen, index), session=session)
         late = f"{lag} cycle{'s' if lag > 1 else ''} late"
         return clock, CycleTiming(index, 0, lag, repeated=False, note=f"cycle {cycle} came {late}")
+    jump = newest - clock.last
+    goes_on = jump > reorder_limit and -reorder_limit < index - newest <= jump
+    if not (is_new_session or goes_on) and -lag > farthest:
+        note = f"cycle number {cycle} after {clock.number(clock.last)} is in doubt, not used"
+        clock = replace(clock, seen=(*seen, index))
+        return clock, CycleTiming(index, 0, 0, repeated=False, note=note, doubted=True)
     has_restarted = is_new_session or lag > 0
     base = clock.last + 1 - cycle if has_restarted else clock.base
     index = cycle + base

@@ -35,6 +35,8 @@ class FrictionObservation:
         Why mu_s is uncertain; empty where it is not.
     common_std : float
         Part of mu_s_std that other cycles share; nan where it is not known.
+    number_is_sure : bool
+        The cycle's number is not to be doubted however far ahead it is: those after it are known.
     """
 
     cycle: int
@@ -46,6 +48,7 @@ class FrictionObservation:
     session: int = 0
     doubt: str = ""
     common_std: float = math.nan
+    number_is_sure: bool = False
 
     @classmethod
     def of(

@@ -43,8 +43,9 @@ def update(
     """Take one cycle into the state.
 
     An estimate that cannot be used leaves wear and batch as they were, says why, and the next good one
-    is used. Cycle numbers may be missing, late, repeated or restart; the clock may go back. A change that
-    somebody said comes with one that cannot be used, or late, is expected with the next that is in order.
+    is used. Cycle numbers may be missing, late, repeated, wrong or restart; the clock may go back. A change
+    that somebody said comes with one that cannot be used, or late, is expected with the next that is in
+    order.
     """
     if state.expects_change:
         observation = replace(observation, expected_change=True)
@@ -54,10 +55,11 @@ def update(
         observation.time_ns,
         settings.reorder_limit,
         observation.session,
+        _farthest(settings, state, observation),
     )
     fault, is_unusable = input_validation.validate_estimate(observation.mu_s, observation.mu_s_std)
     notes = [note for note in (timing.note, fault) if note]
-    noise = state.noise
+    is_unusable, noise = is_unusable or timing.doubted, state.noise
     if not (is_unusable or timing.repeated):
         identical = noise_scale.identical_run(noise, observation.mu_s)
         if identical >= settings.identical_limit:
@@ -180,6 +182,13 @@ def _follow_common_error(state: TrackerState, cycle: UsableCycle) -> TrackerStat
     cycles = min(state.common_cycles + 1.0, COMMON_CYCLES)
     mean = state.common_variance + (variance - state.common_variance) / cycles
     return replace(state, common_variance=mean, common_cycles=cycles)
+
+
+def _farthest(settings: TrackerSettings, state: TrackerState, observation: FrictionObservation) -> float:
+    """Give the cycles ahead beyond which a number is in doubt: more than have been followed, and are late."""
+    if observation.number_is_sure:
+        return math.inf
+    return float(max(settings.reorder_limit, state.clock.last - state.first_index))
 
 
 def _is_other_batch(settings: TrackerSettings, state: TrackerState, observation: FrictionObservation) -> bool:

@@ -47,6 +47,8 @@ GERMAN: Final = {
     r"cycle (\d+) came twice, the second is ignored": r"Zyklus \1 kam zweimal, der zweite zählt nicht",
     r"cycle (\d+) came 1 cycle late": r"Zyklus \1 kam einen Zyklus zu spät",
     r"cycle (\d+) came (\d+) cycles late": r"Zyklus \1 kam \2 Zyklen zu spät",
+    r"cycle number (\d+) after (\d+) is in doubt, not used":
+        r"die Zyklusnummer \1 nach \2 ist zweifelhaft, nicht verwendet",
     r"cycle numbers restarted at (\d+)": r"die Zyklusnummern begannen neu bei \1",
     r"the clock went back by (\S+) s": r"die Uhr ging um \1 s zurück",
     r"friction is found to go steadily from cycle to cycle, the past is seen so from here on":

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from impactcell.cell.series_replay import replay
-from impactcell.cell.series_runs import told_apart
+from impactcell.cell.series_runs import misnumbered, told_apart
 from impactcell.errors import SeriesError
 from impactcell.tracking.wear_batch import FrictionObservation, TrackerSettings
 
@@ -94,3 +94,57 @@ def test_a_late_cycle_of_a_run_is_late_still() -> None:
     tracked = replay(TrackerSettings(), series)
     assert tracked.used == 120
     assert "cycle 4 came 1 cycle late" in [note for _, note in tracked.notes]
+
+
+@pytest.mark.parametrize(
+    ("cycles", "note"),
+    [
+        ([*counted(49), 10_050, *counted(99, first=51)], "stands between cycles 49 and 51"),
+        ([*counted(49), 10_050, *counted(99, first=50)], "stands between cycles 49 and 50"),
+        ([*counted(148), 15, *counted(400, first=150)], "stands between cycles 148 and 150"),
+        ([*range(0, 50_000, 1_000), 520_000, *range(51_000, 90_000, 1_000)], "stands between cycles 49000"),
+    ],
+)
+def test_a_number_that_is_far_from_both_beside_it_is_left_out_and_told(cycles: list[int], note: str) -> None:
+    """All else is as if its row were not there."""
+    series = rows(cycles)
+    ((place, told),) = misnumbered(series, LIMIT).items()
+    assert told.startswith(note)
+    tracked, without = (
+        replay(TrackerSettings(wear_limit=0.25), s) for s in (series, series[:place] + series[place + 1 :])
+    )
+    assert (tracked.used, tracked.notes) == (len(series) - 1, ((cycles[place], told),))
+    assert repr((tracked.wear, tracked.alarms)) == repr((without.wear, without.alarms))
+    assert tracked.cycle.tolist() == cycles
+    assert tracked.level[place] == tracked.level[place - 1]
+
+
+def test_several_wrong_numbers_are_told_each() -> None:
+    series = rows([*counted(49), 10_050, 51, 9_052, *counted(99, first=53)])
+    assert sorted(misnumbered(series, LIMIT)) == [49, 51]
+
+
+@pytest.mark.parametrize(
+    "cycles",
+    [
+        counted(60),
+        [*counted(60), *counted(60)],
+        [*counted(60), *counted(60, first=5_000)],
+        [*counted(500), *counted(3), *counted(500)],
+        [*counted(30), 32, 31, *counted(60, first=33)],
+        [*counted(60), 10_061],
+        [0, 1_000, 2_000, 500_000, 501_000],
+    ],
+)
+def test_gaps_restarts_and_late_cycles_are_no_wrong_numbers(cycles: list[int]) -> None:
+    assert not misnumbered(rows(cycles), LIMIT)
+
+
+def test_cycles_of_a_series_that_are_not_there_have_passed_from_the_first_after_them_on() -> None:
+    """Those that come after it are known, so that nothing is in doubt."""
+    cycles = [*counted(60), *counted(5_060, first=5_000)]
+    tracked = replay(TrackerSettings(), rows(cycles))
+    longer = replay(TrackerSettings(), rows([*cycles, 5_061]))
+    at = cycles.index(5_000)
+    assert tracked.level_std[at] > 10.0 * tracked.level_std[at - 1]
+    assert tracked.level[:-1].tolist() == longer.level[: len(cycles) - 1].tolist()

@@ -305,6 +305,20 @@ def test_a_counter_that_begins_anew_and_a_late_cycle_are_in_order(tmp_path, caps
     assert found["cycles"] == len(cycles)
 
 
+def test_one_wrong_number_is_told_and_moves_neither_wear_nor_alarms(tmp_path, capsys):
+    cycles = np.arange(600)
+    values = 0.2 + 2e-5 * cycles + STD * np.random.default_rng(304).normal(size=600)
+    right = run(capsys, write(tmp_path / "right.csv", np.delete(values, 150), cycles=np.delete(cycles, 150)))
+    path = write(tmp_path / "wrong.csv", values, cycles=np.where(cycles == 150, 10_150, cycles))
+    wrong = run(capsys, path)
+    note = "stands between cycles 149 and 151, not used: correct its number"
+    assert wrong.pop("notes") == [{"cycle": 10_150, "note": note}]
+    assert right.pop("notes") == []
+    assert wrong == right
+    track(path)
+    assert f"cycle 10150: {note}" in capsys.readouterr().out.splitlines()
+
+
 def test_notes_that_are_alike_are_one_line(tmp_path, capsys):
     track(write(tmp_path / "s.csv", truth(60, at=0), std=0.0))
     (line,) = [line for line in capsys.readouterr().out.splitlines() if "standard deviation" in line]

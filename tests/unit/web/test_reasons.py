@@ -87,6 +87,8 @@ def test_what_the_tracker_says_of_a_cycle_is_said_in_german() -> None:
     for cycle in (100, 101, 104, 103, 102, 102, 3):
         clock, timing = update_clock(clock, cycle, (1000 + cycle) * 10**9, 64)
         notes += timing.note.split("; ") if timing.note else []
+    notes.append(update_clock(clock, 900, 0, 64, farthest=100.0)[1].note)
+    assert notes[-1] == "cycle number 900 after 3 is in doubt, not used"
     notes.append(reason_not_ready(initial_state()))
     result = None
     for cycle in range(1, 7):
@@ -95,7 +97,7 @@ def test_what_the_tracker_says_of_a_cycle_is_said_in_german() -> None:
     assert result is not None
     notes += result.notes
     assert notes[-1].startswith("mu_s has been the same 6 times in a row, not used: ")
-    assert len(notes) == 14
+    assert len(notes) == 15
     for note in notes:
         assert german_reason(note) != note
         assert not words(german_reason(note)) & {

@@ -131,3 +131,73 @@ def test_one_that_can_be_one_or_is_not_there_needs_no_note(std):
 
 def test_one_cycle_late_is_not_one_cycles_late():
     assert come([10, 12, 11])[1][-1].note == "cycle 11 came 1 cycle late"
+
+
+def come_with_doubt(cycles, session=0):
+    """Places of cycles that come in this order, where more than 100 ahead is in doubt."""
+    clock, places = CycleClock(), []
+    for cycle in cycles:
+        clock, where = update_clock(clock, cycle, 0, LIMIT, session, farthest=100.0)
+        places.append(where)
+    return clock, places
+
+
+@pytest.mark.parametrize("session", [0, 7])
+def test_a_number_that_is_too_far_ahead_moves_nothing_unless_the_next_goes_on_from_it(session):
+    clock, places = come_with_doubt([10, 11, 10_012, 13, 14], session)
+    assert [p.doubted for p in places] == [False, False, True, False, False]
+    assert [(p.index, p.passed) for p in places if not p.doubted] == [(10, 0), (11, 1), (13, 2), (14, 1)]
+    assert [p.note for p in places if p.note] == ["cycle number 10012 after 11 is in doubt, not used"]
+    assert (clock.base, clock.earlier, clock.last) == (0, (), 14)
+
+
+@pytest.mark.parametrize("following", [10_013, 10_014, 10_011])
+def test_a_number_from_which_the_next_goes_on_is_believed_and_the_cycles_between_have_passed(following):
+    clock, places = come_with_doubt([10, 11, 10_012, following, 10_020])
+    assert [(p.index, p.passed) for p in places[3:]] == [
+        (following, following - 11),
+        (10_020, 10_020 - following),
+    ]
+    assert [p.doubted for p in places] == [False, False, True, False, False]
+    assert (clock.base, clock.number(clock.last)) == (0, 10_020)
+
+
+def test_a_number_in_doubt_may_come_twice_and_late_cycles_come_late_still():
+    _, places = come_with_doubt([10, 11, 10_012, 10_012, 10_013])
+    assert [p.repeated for p in places] == [False, False, False, True, False]
+    assert (places[-1].index, places[-1].doubted) == (10_013, False)
+    _, places = come_with_doubt([10, 12, 10_013, 11, 14])
+    assert [(p.index, p.passed, p.lag) for p in places[3:]] == [(11, 0, 1), (14, 2, 0)]
+
+
+def test_a_module_that_starts_anew_after_a_number_in_doubt_has_restarted():
+    _, places = come_with_doubt([500, 501, 10_502, 1, 2])
+    assert [p.index for p in places if not p.doubted] == [500, 501, 502, 503]
+    assert places[3].note == "cycle numbers restarted at 1"
+
+
+def test_two_wrong_numbers_one_after_the_other_are_in_doubt_each():
+    _, places = come_with_doubt([10, 11, 10_012, 500_000, 14, 15])
+    assert [p.doubted for p in places] == [False, False, True, True, False, False]
+    assert [(p.index, p.passed) for p in places[4:]] == [(14, 3), (15, 1)]
+
+
+def test_cycles_of_which_few_are_measured_are_followed_from_the_third_on():
+    clock, places = CycleClock(), []
+    for cycle in range(1000, 9000, 1000):
+        clock, where = update_clock(clock, cycle, 0, LIMIT, farthest=max(LIMIT, clock.last - 1000))
+        places.append(where)
+    assert [p.doubted for p in places] == [False, True] + 6 * [False]
+    assert [p.passed for p in places[2:]] == [2000, *[1000] * 5]
+
+
+def test_a_gap_of_no_more_than_is_in_doubt_is_one_at_once():
+    assert [p.passed for p in come_with_doubt([10, 110, 111])[1]] == [0, 100, 1]
+
+
+def test_a_number_after_many_cycles_of_no_use_is_not_in_doubt():
+    clock, _ = come([100])
+    for cycle in range(101, 300):
+        clock = replace(update_clock(clock, cycle, 0, LIMIT, farthest=100.0)[0], last=100)
+    _, timing = update_clock(clock, 300, 0, LIMIT, farthest=100.0)
+    assert (timing.passed, timing.doubted) == (200, False)

@@ -422,3 +422,46 @@ def test_what_estimates_share_is_learned_anew_with_the_level_and_kept_over_unusa
     fresh = wear_batch.reset_wear_level(state)
     renewed = wear_batch.update(KNOWN, fresh, replace(shared[0], cycle=31, common_std=0.001))
     assert renewed.wear.level_common_std == pytest.approx(0.001)
+
+
+@pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
+def test_one_wrong_cycle_number_bends_neither_level_nor_rate(config):
+    """All is as if that cycle had not been measured."""
+    readings = series(700, slope=2e-5, batch="A")
+    wrong = replace(readings[150], cycle=10_150)
+    lost = run(config, [*readings[:150], replace(readings[150], mu_s=math.nan), *readings[151:]])
+    outcomes = run(config, [*readings[:150], wrong, *readings[151:]])
+    for outcome, expected in zip(outcomes[151:], lost[151:], strict=True):
+        assert repr((outcome.wear, outcome.batch, outcome.shift)) == repr(
+            (expected.wear, expected.batch, expected.shift)
+        )
+    assert [n for o in outcomes for n in o.notes] == ["cycle number 10150 after 149 is in doubt, not used"]
+    assert outcomes[150].wear.quality is Quality.UNCERTAIN
+
+
+def test_cycles_that_were_lost_before_the_first_that_is_followed_again_have_passed():
+    """An outage that is longer than all before it, and the wear in it."""
+    rate = 2e-6
+    readings = series(600, slope=rate)
+    later = [replace(r, cycle=r.cycle + 5_000, mu_s=r.mu_s + 5_000 * rate) for r in readings[200:]]
+    outcomes = run(UNKNOWN, [*readings[:200], *later])
+    wear = outcomes[-1].wear
+    assert outcomes[-1].state.clock.last == 5_599
+    assert abs(wear.rate_per_cycle - rate) < 3.0 * wear.rate_std < rate
+    assert [o.used for o in outcomes].count(False) == 1
+
+
+def test_a_change_that_is_said_with_a_number_in_doubt_is_expected_with_the_next():
+    readings = series(300, step=20.0, at=150)
+    readings[150] = replace(readings[150], cycle=10_150, expected_change=True)
+    outcomes = run(UNKNOWN, readings)
+    assert not any(o.shift for o in outcomes)
+    assert outcomes[151].expected
+
+
+def test_a_restart_between_a_number_in_doubt_and_the_next_goes_on_to_the_same_bits():
+    readings = series(300, slope=2e-5)
+    readings[150] = replace(readings[150], cycle=10_150)
+    outcomes = run(UNKNOWN, readings)
+    state = unpack(TrackerState, pack(outcomes[150].state))
+    assert pack(run(UNKNOWN, readings[151:], state)[-1].state) == pack(outcomes[-1].state)
