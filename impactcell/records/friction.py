@@ -83,7 +83,9 @@ class WearState:
     are known better than the level itself. Probability and cycles to the limit are those of the level as the
     cell measures it, for a limit that was set by what the cell shows. Cycles to the limit take wear to go on
     as it has; its rate may change by half of itself (95 %) over as many cycles as it was
-    followed. Where it becomes many times as fast the limit is passed sooner than told.
+    followed. Their interval is one of 95 % for wear that keeps its rate or changes it by no more. Where the
+    rate doubles meanwhile, as that of wear that grows with the square of the cycles, the limit is passed
+    sooner than told, and where wear comes to an end later or never.
 
     Attributes
     ----------

@@ -2,7 +2,8 @@
 
 It watches the probability that the level will be above the limit a number of cycles from now, the horizon,
 with hysteresis in probability. What is promised: when it comes, the limit is passed within the horizon with
-at least the probability that is asked for. Once the limit itself is passed `WearLimit` takes its place.
+at least the probability that is asked for, as far as wear keeps its rate (see `WearState`). Once the limit
+itself is passed `WearLimit` takes its place.
 """
 
 import math

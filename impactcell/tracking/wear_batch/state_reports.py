@@ -110,7 +110,7 @@ def tracking_result(
         batch,
         None if outcome.change is None else _evidence(settings, state, outcome.change),
         outcome.expected,
-        *_at_horizon(settings, state, moments),
+        *_at_horizon(settings, state, moments, walks),
         outcome.innovation,
         outcome.used,
         tuple(notes),
@@ -141,11 +141,12 @@ def _believed_bank(settings: TrackerSettings, state: TrackerState) -> tuple[Samp
     return rate_changes.mixture(state.bank, state.rates, prior) if is_bent else state.bank, is_bent
 
 
-def _at_horizon(settings: TrackerSettings, state: TrackerState, moments: WearMoments) -> tuple[float, float]:
+def _at_horizon(
+    settings: TrackerSettings, state: TrackerState, moments: WearMoments, walks: tuple[float, float]
+) -> tuple[float, float]:
     """Give the cycles that are looked ahead, no more than have been seen, and P(level > limit) then."""
     if not math.isfinite(settings.wear_limit):
         return math.nan, math.nan
-    walks = state.level_variance, state.slope_variance
     ahead = wear_report.extrapolation(moments, walks, settings.wear_limit)
     prior = _slope_prior(settings, state)
     horizon = min(settings.horizon_cycles, float(state.clock.last - state.first_index))

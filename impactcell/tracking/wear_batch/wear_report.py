@@ -22,7 +22,8 @@ BISECTION = 1e-10
 
 RATE_DOUBT = 0.25
 """Standard deviation by which wear may change its rate over as many cycles as it has been followed, in its
-rate. Surfaces run in, and wear out; without it the intervals are those of wear that is steady for ever."""
+rate. Surfaces run in, and wear out; without it intervals and the probability at the horizon are those of
+wear that is steady for ever."""
 
 
 class WearMoments(NamedTuple):

@@ -288,6 +288,25 @@ def test_the_interval_of_cycles_left_is_not_that_of_wear_that_is_steady_for_ever
     assert wear.cycles_to_limit_high < 2.0 * slowed
 
 
+@pytest.mark.parametrize("batch", [None, "A"], ids=["unknown", "known"])
+@pytest.mark.parametrize(
+    ("wear", "limit"),
+    [
+        (lambda k: 2e-5 * k, 0.235),
+        (lambda k: -0.02 * np.expm1(-k / 300.0), 0.225),
+        (lambda k: 0.03 * (k / 1500.0) ** 2, 0.225),
+    ],
+    ids=["steady", "runs in, and never there", "hastens"],
+)
+def test_the_limit_is_no_surer_at_the_horizon_than_by_the_interval_of_cycles_left(wear, limit, batch):
+    """Sure by more than 97.5 % to be passed within it, and a 95 % interval that ends beyond it: not both."""
+    readings = [replace(r, mu_s=r.mu_s + wear(float(r.cycle))) for r in series(1200, slope=0.0, batch=batch)]
+    outcomes = run(replace(KNOWN if batch else UNKNOWN, wear_limit=limit), readings)
+    sure = [o for o in outcomes if o.probability_at_horizon > 0.975]
+    assert all(o.wear.cycles_to_limit_high <= o.horizon for o in sure)
+    assert sure or limit == 0.225
+
+
 @pytest.mark.parametrize("name", ["A", "B"], ids=["in the first batch", "in a later one"])
 def test_a_change_within_a_known_batch_is_found_and_is_no_wear(name):
     readings = [replace(r, batch_id="A" if r.cycle < 200 else name) for r in series(700, slope=2e-6)]
