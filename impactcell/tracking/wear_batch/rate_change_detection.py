@@ -5,13 +5,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from impactcell.tracking.wear_batch import batch_change_detection, batch_filter, rate_changes, run_length_bank
+from impactcell.tracking.wear_batch import (
+    batch_change_detection,
+    batch_filter,
+    noise_scale,
+    rate_changes,
+    run_length_bank,
+)
 from impactcell.tracking.wear_batch.batch_filter import BankUpdate
 from impactcell.tracking.wear_batch.input_validation import CycleClock
 from impactcell.tracking.wear_batch.run_length_model import SLOPE
 from impactcell.tracking.wear_batch.settings import TrackerSettings
 from impactcell.tracking.wear_batch.state import RateChange, TrackerState, UsableCycle
 from impactcell.tracking.wear_batch.wear_report import INTERVAL_STDS
+
+STEEPEST = 1.0
+"""Rate a cycle, in standard deviations of a usual estimate, beyond which none is told: the scatter, learned
+from differences, is then that of wear itself, as where values have none, and shows no change of it."""
 
 
 def detect_rate_change(
@@ -38,6 +48,8 @@ def detect_rate_change(
     likeliest = rates[int(np.argmax(rates["log_weight"]))]
     before = float(run_length_bank.moments(updated.bank)[0][SLOPE])
     after, std = float(likeliest["mean"][SLOPE]), math.sqrt(likeliest["covariance"][SLOPE, SLOPE])
+    if abs(after) > STEEPEST * math.sqrt(noise_scale.usual_variance(cycle.noise)):
+        return state, updated, []
     change = RateChange(int(likeliest["change_cycle"]), before, after, std, index)
     interval = f"{1000.0 * after:.3g} ± {1000.0 * INTERVAL_STDS * std:.2g}"
     note = (

@@ -185,6 +185,16 @@ def test_another_rate_is_found_and_told_and_no_batch_is_blamed(knowledge, before
     assert wear.level_std < 0.6 * UNIT
 
 
+@pytest.mark.parametrize("rate", [1e-5, -1e-4])
+@pytest.mark.parametrize("std", [UNIT, None])
+def test_values_without_scatter_have_one_rate(rate, std):
+    """Differences of them are wear and nothing else."""
+    cycles = np.arange(400)
+    tracked = impactcell.track(cycles, 0.3 + rate * cycles, std)
+    assert (tracked.notes, tracked.alarms) == ((), ())
+    assert abs(tracked.wear.rate_per_cycle - rate) < 2.0 * tracked.wear.rate_std < 0.3 * abs(rate)
+
+
 @pytest.mark.parametrize("size", [5.0, 15.0])
 @pytest.mark.parametrize("time", [50.0, 200.0, 600.0])
 def test_a_surface_that_runs_in_is_no_other_material(size, time):
