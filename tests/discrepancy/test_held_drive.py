@@ -4,6 +4,8 @@ import math
 import re
 from dataclasses import replace
 from functools import lru_cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,13 @@ from scipy.integrate import solve_ivp
 
 from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.machine import BaseModel, MachineFinding, NumberPrior, investigate_machine
+from impactcell.discrepancy.machine.experiment_design import _changes
+from impactcell.discrepancy.machine.finding import FittedModel
+from impactcell.discrepancy.machine.regression import LinearFit
+from impactcell.discrepancy.machine.simulation import simulate_held_out
+from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import uniform_records
+from impactcell.discrepancy.machine.weak_form import build_rows
 from impactcell.discrepancy.report.german_notes import note as german_note
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.features import drive_noise_std
@@ -134,6 +142,79 @@ def test_a_slow_command_acts_until_the_next_one() -> None:
     assert np.abs(record.force[1:-1] - exact[1:-1]).max() <= 8.0
     assert np.count_nonzero(np.abs(record.force - exact) > 1e-9) <= 8
     assert record.force.sum() == pytest.approx(exact.sum(), abs=8.0)
+
+
+def _pulled(until_s: float, levels: np.ndarray, level_s: float, delay_s: float) -> float:
+    """Place of a mass with dry friction at a time, by the parabolas of each level, which acts late."""
+    place, speed, now = 0.0, 0.0, 0.0
+    while now < until_s:
+        number = math.floor((now + delay_s) / level_s + 1e-9)
+        force = float(levels[min(max(number, 0), len(levels) - 1)])
+        end = min((number + 1) * level_s - delay_s, until_s)
+        sense = math.copysign(1.0, speed or force)
+        rate = (force - sense * FRICTION_N) / MASS_KG
+        if speed == 0.0 and abs(force) <= FRICTION_N:
+            now = end
+            continue
+        stop = now - speed / rate if speed * rate < 0.0 else math.inf
+        last = min(end, stop)
+        place += speed * (last - now) + 0.5 * rate * (last - now) ** 2
+        speed = 0.0 if last == stop else speed + rate * (last - now)
+        now = last
+    return place
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.0037, -0.0071])
+def test_a_command_is_simulated_as_it_acts(delay_s: float) -> None:
+    """Levels of half a second, far slower than the samples: parabolas from switch to switch and stop."""
+    step_s, level_s = 0.01, 0.5
+    levels = np.random.default_rng(4).uniform(-6.0, 6.0, 40)
+    time = step_s * np.arange(2000)
+    position = np.array([_pulled(at, levels, level_s, delay_s) for at in time])
+    command = np.repeat(levels, 50)
+    shot = Capture(1, math.nan, MASS_KG, Channel(time, command, None), Channel(time, position, 1e-6))
+    base = BaseModel(inertia=NumberPrior(MASS_KG))
+    records = uniform_records(Campaign(Excitation.DRIVEN, (shot,)), base)
+    friction = ChosenTerm(base.terms[0], 0.0)
+    values = np.array([FRICTION_N])
+    fit = LinearFit(friction.columns, values, values, values, np.array([False]))
+    finding: Any = SimpleNamespace(
+        held_spans=[(0, 0.0, time[-1])], records=records, scale=SimpleNamespace(period_s=4.0)
+    )
+    error = simulate_held_out(finding, FittedModel(base, (friction,), fit, delay_s, 0.0))
+    assert np.ptp(position) > 0.5
+    assert error.rmse < 2e-3 * np.ptp(position)
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.0037, -0.0071])
+def test_rows_are_exact_where_a_command_switches(delay_s: float) -> None:
+    """A mass without friction: speeds are lines and places parabolas from switch to switch."""
+    step_s, level_s = 0.01, 0.07
+    levels = np.random.default_rng(5).uniform(-6.0, 6.0, 60)
+    edges = np.concatenate([[-1.0], level_s * np.arange(1, 60) - delay_s, [9.0]])
+    speeds = np.concatenate([[0.0], np.cumsum(np.diff(edges) * levels)]) / MASS_KG
+    places = np.concatenate([[0.0], np.cumsum(np.diff(edges) * 0.5 * (speeds[1:] + speeds[:-1]))])
+    time = step_s * np.arange(420)
+    inside = np.searchsorted(edges, time, "right") - 1
+    after = time - edges[inside]
+    position = places[inside] + after * (speeds[inside] + 0.5 * after * levels[inside] / MASS_KG)
+    command = np.repeat(levels, 7)
+    shot = Capture(1, math.nan, MASS_KG, Channel(time, command, None), Channel(time, position, 1e-6))
+    base = BaseModel(inertia=NumberPrior(MASS_KG), terms=(), delay_s=NumberPrior(delay_s))
+    records = uniform_records(Campaign(Excitation.DRIVEN, (shot,)), base)
+    rows = build_rows(records, base, {}, (0.0, delay_s))
+    assert len(rows.target) > 10
+    assert np.abs(rows.target).max() < 1e-9 * DRIVE_N
+
+
+def test_a_command_that_is_driven_harder_acts_until_the_next_one_too() -> None:
+    record = uniform_records(Campaign(Excitation.DRIVEN, cart(0)[:1]), CART)[0]
+    [harder] = [one for one in _changes(found(), record) if one.words.endswith("its drive 2 times as strong")]
+    assert harder.records[0].command == pytest.approx(2.0 * record.command)
+    part = record.part(100, 200)
+    assert record.command is not None
+    assert part.command is not None
+    assert part.command.tolist() == record.command[100:200].tolist()
 
 
 @pytest.mark.parametrize("held", [2, 5, 20])

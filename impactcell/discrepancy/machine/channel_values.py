@@ -25,12 +25,12 @@ KINK_LEFT = 0.2
 """Share of an outlier's roughness that may be left about it once it is replaced: about a kink more is [1]."""
 
 
-def held_mean(times: Samples, values: Samples, at: Samples) -> Samples:
-    """Mean force from half a sample before to half a sample after, where each acts until the next one."""
-    impulse = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(times))])
-    half = 0.5 * (at[1] - at[0])
-    low, high = (np.clip(at + sign * half, times[0], times[-1]) for sign in (-1.0, 1.0))
-    mean: Samples = (np.interp(high, times, impulse) - np.interp(low, times, impulse)) / (high - low)
+def held_mean(times: Samples, values: Samples, begin: Samples, end: Samples) -> Samples:
+    """Mean force from each begin to each end, where each value acts until the next one, the last as long."""
+    edges = np.append(times, 2.0 * times[-1] - times[-2])
+    impulse = np.concatenate([[0.0], np.cumsum(values * np.diff(edges))])
+    low, high = (np.clip(at, edges[0], edges[-1]) for at in (begin, end))
+    mean: Samples = (np.interp(high, edges, impulse) - np.interp(low, edges, impulse)) / (high - low)
     return mean
 
 

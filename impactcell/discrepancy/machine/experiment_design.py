@@ -104,11 +104,11 @@ def _ways(
         words = "its motion" if is_input else "its drive", " times as fast"
         yield words, FACTORS, partial(_at_pace, record)
     if is_driven and not is_input:
-        yield ("its drive", " times as strong"), FACTORS, partial(_scaled, record, "force", 0.0)
+        yield ("its drive", " times as strong"), FACTORS, partial(_driven_by, record)
     else:
         words = ("its motion", " times as wide") if is_input else ("released from", " times as far")
         centre = float(record.position.mean()) if is_input else 0.0
-        yield words, FACTORS, partial(_scaled, record, "position", centre)
+        yield words, FACTORS, partial(_as_wide, record, centre)
     for column in sorted(record.covariates):
         values = [other.covariates[column] for other in finding.records if column in other.covariates]
         low, span = min(values), max(values) - min(values)
@@ -117,11 +117,19 @@ def _ways(
             yield (f"{column} at", ""), [low + share * span for share in COLUMN_SHARES], set_to
 
 
-def _scaled(record: UniformRecord, channel: str, centre: float, factor: float) -> UniformRecord:
-    """Scale a channel about a value of it."""
+def _driven_by(record: UniformRecord, factor: float) -> UniformRecord:
+    """Drive so many times as strongly."""
     if factor == UNCHANGED:
         return record
-    return replace(record, **{channel: centre + factor * (getattr(record, channel) - centre)})
+    command = None if record.command is None else factor * record.command
+    return replace(record, force=factor * record.force, command=command)
+
+
+def _as_wide(record: UniformRecord, centre: float, factor: float) -> UniformRecord:
+    """Scale positions about one of them."""
+    if factor == UNCHANGED:
+        return record
+    return replace(record, position=centre + factor * (record.position - centre))
 
 
 def _at_pace(record: UniformRecord, factor: float) -> UniformRecord:

@@ -1,7 +1,8 @@
 """Open-loop simulation of held-out stretches: a model runs by itself, from the first state of each.
 
 Steps are Moreau's: position at the half step, all forces but friction at once, and friction as an impulse
-that may stop the part and never turns it. Where the force is predicted, the measured motion is the input, and
+that may stop the part and never turns it. A command is held from its sample to the next, and a part that it
+stops within a step goes on from rest. Where the force is predicted, the measured motion is the input, and
 both forces are averaged as the regression averages.
 """
 
@@ -10,7 +11,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from impactcell.discrepancy.machine.base_model import PRIOR_REACH, Response
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, OpenLoopError
@@ -26,6 +26,7 @@ from impactcell.discrepancy.machine.held_out_stretch import (
 from impactcell.discrepancy.machine.model_forces import law_of
 from impactcell.discrepancy.machine.motion_scale import MotionScale, carried_load, half_supports, is_told
 from impactcell.discrepancy.machine.smoothing import averaged, smoothed_acceleration, smoothed_speed
+from impactcell.discrepancy.machine.step_forces import Drive, drive_of
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, direction_of_motion, eccentricity_waves
 from impactcell.records import Samples
@@ -119,10 +120,9 @@ def _positions(
     """
     records = [record for record, _ in stretches]
     measured = [record.position[stretch] for record, stretch in stretches]
-    drives, start = [], np.empty((2, len(records)))
-    for lane, (record, stretch) in enumerate(stretches):
-        drives.append(np.interp(record.time_s[stretch] + model.delay_s, record.time_s, record.force))
-        start[:, lane] = first_state(record.position[stretch], record.step_s)
+    drives = [drive_of(record, stretch, model.delay_s) for record, stretch in stretches]
+    states = [first_state(values, record.step_s) for record, values in zip(records, measured, strict=True)]
+    start = np.array(states).T
     run = _runner(model, records, drives, period_s)
     begin = [
         max(min(int(START_PERIODS * period_s / record.step_s), len(values) // 4), 2)
@@ -131,17 +131,19 @@ def _positions(
     constant = np.zeros(len(records))
     adrift = drifts(model.base)
     if adrift:
-        # A drift shows at the longest step that a simulation may have.
+        # A drift shows at the longest step that a simulation may have, where no drive is switched within it.
         every = max(int(period_s / (STEPS_PER_PERIOD * max(record.step_s for record in records))), 1)
+        if any(record.force_is_command for record in records):
+            every = 1
         thin = [replace(record, time_s=record.time_s[::every]) for record in records]
-        pushes = [uniform_filter1d(drive, every, mode="nearest")[::every] for drive in drives]
+        pushes = [drive_of(record, stretch, model.delay_s, every) for record, stretch in stretches]
         places = [values[::every] for values in measured]
         beside = _runner(model, thin * 2, pushes * 2, period_s)
 
         def settled(state: Samples, constant: Samples) -> Samples:
             return constant_forces(
                 lambda forces: beside(np.tile(state, 2), max(map(len, places)), forces),
-                (pushes, places),
+                ([push.values for push in pushes], places),
                 constant,
                 PRIOR_REACH * model.base.force_offset.std,
                 RECORD_STEPS if model.base.force_offset_by_record else OFFSET_STEPS,
@@ -159,14 +161,13 @@ def positions_from(
     model: FittedModel, records: Sequence[UniformRecord], start: Samples, period_s: float
 ) -> list[Samples]:
     """Positions that forces lead to from first states of shape (2, n), as long as each force."""
-    out = _runner(model, records, [record.force for record in records], period_s)(
-        start, max(len(record.force) for record in records)
-    )
+    drives = [drive_of(record, slice(None), 0.0) for record in records]
+    out = _runner(model, records, drives, period_s)(start, max(len(record.force) for record in records))
     return [out[: len(record.force), lane] for lane, record in enumerate(records)]
 
 
 def _runner(
-    model: FittedModel, records: Sequence[UniformRecord], drives: Sequence[Samples], period_s: float
+    model: FittedModel, records: Sequence[UniformRecord], drives: Sequence[Drive], period_s: float
 ) -> Callable[..., Samples]:
     """Run all drives side by side: from first states (2, lanes) to positions (samples, lanes).
 
@@ -174,11 +175,11 @@ def _runner(
     """
     parts = max(math.ceil(STEPS_PER_PERIOD * max(record.step_s for record in records) / period_s), 1)
     step = np.array([record.step_s for record in records]) / parts
-    drive = np.zeros((max(map(len, drives)) + 1, len(records)))
-    for lane, force in enumerate(drives):
-        drive[: len(force), lane] = force
-        drive[len(force) :, lane] = force[-1]
-    drive = drive * (1.0 + model.nuisance("force_gain")) + model.nuisance("force_offset")
+    drive = np.zeros((max(len(one.values) for one in drives), parts, len(records)))
+    for lane, one in enumerate(drives):
+        drive[: len(one.values), :, lane] = one.over(
+            parts, 1.0 + model.nuisance("force_gain"), model.nuisance("force_offset")
+        )
     inertia = np.array([record.inertia for record in records]) * (1.0 + model.nuisance("inertia"))
     columns = {term.choice.covariate for term in model.terms}
     law = law_of(
@@ -189,6 +190,7 @@ def _runner(
     eccentricity = _eccentricity(model)
     far = RUNAWAY * max(float(np.abs(record.position).max()) for record in records)
     fast = far / float(step.max())
+    commanded = np.array([record.force_is_command for record in records])
 
     def reading(angle: Samples) -> Samples:
         """Give what an encoder off its centre reads beside the angle."""
@@ -206,7 +208,13 @@ def _runner(
             freely = v + step * (outside + smooth) / inertia
             held = step * np.maximum(friction, 0.0) / inertia
             ahead = np.sign(freely) * np.clip(np.abs(freely) - held, 0.0, fast)
-        return np.clip(middle + 0.5 * step * ahead, -far, far), ahead
+            if commanded.any():
+                turned, mean = _with_a_stop(v, freely, held)
+                ahead = np.where(commanded, np.clip(turned, -fast, fast), ahead)
+        there = middle + 0.5 * step * ahead
+        if commanded.any():
+            there = np.where(commanded, q + step * mean, there)
+        return np.clip(there, -far, far), ahead
 
     def run(state: Samples, count: int, constant: Samples | float = 0.0) -> Samples:
         slope = eccentricity @ np.stack([-np.sin(state[0]), np.cos(state[0])])
@@ -215,11 +223,27 @@ def _runner(
         for place in range(count):
             out[place] = q + reading(q)
             for part in range(parts):
-                share = (part + 0.5) / parts
-                q, v = advance(q, v, (1.0 - share) * drive[place] + share * drive[place + 1] + constant)
+                q, v = advance(q, v, drive[place, part] + constant)
         return out
 
     return run
+
+
+def _with_a_stop(v: Samples, freely: Samples, held: Samples) -> tuple[Samples, Samples]:
+    """Speed after a step that begins at v, and mean speed over it, if friction stops the part within it.
+
+    `freely` is the speed that it would have without friction, `held` what friction takes at most. What is
+    left of the step after a stop begins at rest.
+    """
+    slid = freely - np.sign(v) * held
+    stops = slid * v <= 0.0
+    share = np.divide(v, v - slid, out=np.zeros_like(v), where=stops & (v != slid))
+    push = freely - v
+    ahead = (1.0 - share) * np.sign(push) * np.maximum(np.abs(push) - held, 0.0)
+    return (
+        np.where(stops, ahead, slid),
+        0.5 * np.where(stops, share * v + (1.0 - share) * ahead, v + slid),
+    )
 
 
 def _gravity_deviation(model: FittedModel) -> tuple[float, float]:

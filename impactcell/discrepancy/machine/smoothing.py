@@ -41,15 +41,25 @@ def averaged(values: Samples, half: int, step: float) -> Samples:
     return np.convolve(np.pad(values, half + 1, mode="reflect"), weight, "valid")
 
 
+def bell(half: int) -> Samples:
+    """Weights of a mean by samples of w alone, shape (2 half + 3,).
+
+    With second differences they go together for what is held from sample to sample and has been averaged with
+    the hat of a second difference, from one sample before to one after.
+    """
+    place = np.arange(-half - 1, half + 2) / (half + 1.0)
+    weight: Samples = np.maximum(1.0 - place**2, 0.0) ** TEST_FUNCTION_POWER
+    weight /= weight.sum()
+    return weight
+
+
 def test_function(half: int, step: float) -> tuple[Samples, Samples]:
     """Weights of a mean, and of the mean second derivative by second differences, shape (2 half + 3,).
 
     A second difference is q'' and a twelfth of the second difference of q'', to the fourth order of the step;
     the weights of the mean are so too (Numerov 1924), and the two belong together.
     """
-    place = np.arange(-half - 1, half + 2) / (half + 1.0)
-    weight = np.maximum(1.0 - place**2, 0.0) ** TEST_FUNCTION_POWER
-    weight /= weight.sum()
+    weight = bell(half)
     curvature = np.convolve(weight, [1.0, -2.0, 1.0], "same") / step**2
     return np.convolve(weight, np.array([1.0, 10.0, 1.0]) / 12.0, "same"), curvature
 

@@ -39,8 +39,9 @@ class UniformRecord:
     noise : tuple of float
         Standard deviation of position and force: as stated, else from third differences.
     noise_is_stated : tuple of bool
-    force_is_command : bool
-        Held from its sample to the next, without noise.
+    command : ndarray, shape (n,), or None
+        Force that is held from its sample to the next, without noise: its mean from each sample to the next,
+        where `force` is that from half a sample before to half a sample after; None of a measured one.
     force_span : float
         Values that one sample of the force makes, where it is held or sampled more slowly than the position.
     finer : int
@@ -60,10 +61,15 @@ class UniformRecord:
     spikes: int
     noise: tuple[float, float]
     noise_is_stated: tuple[bool, bool] = (False, False)
-    force_is_command: bool = False
     force_span: float = 1.0
     finer: int = 1
     gaps: Gaps = ()
+    command: Samples | None = None
+
+    @property
+    def force_is_command(self) -> bool:
+        """Whether the force is held from its sample to the next, without noise."""
+        return self.command is not None
 
     @property
     def step_s(self) -> float:
@@ -80,6 +86,7 @@ class UniformRecord:
             time_s=time_s,
             position=self.position[inside],
             force=self.force[inside],
+            command=None if self.command is None else self.command[inside],
             gaps=tuple((low, high) for low, high in gaps if low < time_s[-1] and high > 0.0),
         )
 
@@ -154,10 +161,13 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
     values = [
         np.interp(time, channel.time_s, clean) for channel, (clean, _) in zip(channels, cleaned, strict=True)
     ]
+    command = None
     if is_held:
         # What is switched for a moment is no spike.
         cleaned[1] = (channels[1].values, 0)
-        values[1] = held_mean(channels[1].time_s, channels[1].values, time)
+        half = 0.5 * step
+        values[1] = held_mean(channels[1].time_s, channels[1].values, time - half, time + half)
+        command = held_mean(channels[1].time_s, channels[1].values, time, time + step)
     stated = shot.position.noise_std is not None
     noise = noise_std(shot.position) if stated else white_noise_std(cleaned[0][0])
     force_noise, force_span = 0.0, 1.0
@@ -180,9 +190,9 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         spikes=sum(spikes for _, spikes in cleaned),
         noise=(noise, abs(gain) * force_noise),
         noise_is_stated=(stated, channels[-1].noise_std is not None),
-        force_is_command=is_held,
         force_span=force_span,
         gaps=_gaps(channels, base.delay_s, begin),
+        command=None if command is None else gain * command + base.force_offset.value,
     )
 
 

@@ -21,7 +21,8 @@ from impactcell.discrepancy.machine.motion_scale import (
     motion_scale,
 )
 from impactcell.discrepancy.machine.rival_forms import Basis, free_columns, hats
-from impactcell.discrepancy.machine.smoothing import smoothed_speed, test_function, test_slope
+from impactcell.discrepancy.machine.smoothing import bell, smoothed_speed, test_function, test_slope
+from impactcell.discrepancy.machine.step_forces import force_about
 from impactcell.discrepancy.machine.terms import MotionState, Term
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.records import Samples
@@ -41,6 +42,8 @@ MAX_RESTING_SHARE = 0.5
 """Share of a row's support at rest beyond which it says nothing of friction: the part may stick [1]."""
 FINER = 9
 """Values between two neighbours of one on the grid of a shape."""
+GAIN: Column = ("force_gain", 0.0, 0)
+"""Column of what is measured too large of the force."""
 ECCENTRICITY = "position_eccentricity"
 """Columns of an encoder that turns off its centre: e_c and e_s."""
 
@@ -116,11 +119,10 @@ def _record_rows(
     step = record.step_s
     half, narrow = half_supports(record, scale)
     weight, curvature = test_function(half, step)
-    slope = test_slope(weight, step)
+    pushing = weight if record.command is None else bell(half)
+    slope = test_slope(pushing, step)
     velocity, speed_noise = smoothed_speed(record.position, narrow, step)
-    force = record.force
-    if delay_s:
-        force = np.interp(record.time_s + delay_s, record.time_s, force)
+    force = force_about(record, delay_s)
     load = carried_load(base.response, record, force, (gravity, scale))
     centres: IndexArray = np.arange(half + narrow, len(force) - half - narrow, half, dtype=np.int64)
     centres = centres[is_told(record, scale)[centres]]
@@ -130,7 +132,7 @@ def _record_rows(
     accelerating = record.inertia * _averaged(record.position, curvature, centres)
     one = np.ones(len(force))
     raw: dict[Column, Samples] = {
-        ("force_gain", 0.0, 0): force,
+        GAIN: force,
         ("force_offset", 0.0, 0): one,
         ("gravity_torque", 0.0, 0): -np.sin(record.position),
         ("position_offset", 0.0, 0): gravity * np.cos(record.position),
@@ -145,6 +147,7 @@ def _record_rows(
     motion = MotionState(record.position, velocity, load, one)
     raw |= free_columns(motion, direction, scale.ranges, basis)
     columns = {name: _averaged(values, weight, centres) for name, values in raw.items()}
+    columns[GAIN] = _averaged(force, pushing, centres)
     if base.coordinate is Coordinate.ROTATION:
         # The angle is what is read less e_c cos q + e_s sin q: to first order a force by inertia and gravity.
         for number, wave in enumerate(eccentricity_waves(record.position)):
@@ -155,10 +158,10 @@ def _record_rows(
     columns["inertia", 0.0, 0] = -accelerating
     if base.response is Response.FORCE:
         # What is measured is the gain times what a rigid machine would need, and friction in its own unit.
-        columns["force_gain", 0.0, 0] = gravity * columns["gravity_torque", 0.0, 0] - accelerating
-    target = accelerating - _averaged(
-        force - base.gravity_torque.value * np.sin(record.position), weight, centres
-    )
+        columns[GAIN] = gravity * columns["gravity_torque", 0.0, 0] - accelerating
+    gravitating = base.gravity_torque.value * np.sin(record.position)
+    target = accelerating - _averaged(force - gravitating, weight, centres)
+    target -= _averaged(force, pushing - weight, centres)
     # F(t + d) is linear in d about the delay of now, and counted from the one that is stated.
     columns["delay_s", 0.0, 0] = _averaged(force, slope, centres)
     target += (delay_s - base.delay_s.value) * columns["delay_s", 0.0, 0]
