@@ -58,7 +58,8 @@ def write_machine_findings(finding: MachineFinding, data: Campaign, output: Path
         law = finding.law
         if law is not None and law.choice is not None:
             proposed = replace(law.model.base, terms=(*terms, law.choice))
-            text = base_model_text(proposed, data.excitation, provenance)
+            of_law = provenance | {"held-out gap after": f"{law.fall.after:.4g}"}
+            text = base_model_text(proposed, data.excitation, of_law)
             (beside / f"{law.place}.yaml").write_text(text, encoding="utf-8")
         write_machine_reports(finding, document, source, beside)
 

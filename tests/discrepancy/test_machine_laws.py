@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
 import impactcell
+from impactcell.api.machine_findings import write_machine_findings
 from impactcell.campaign import Campaign, Coordinate, Excitation, write
 from impactcell.cli.app import app
 from impactcell.discrepancy.machine import (
@@ -25,6 +26,7 @@ from impactcell.discrepancy.machine import (
     Response,
     investigate_machine,
     investigation,
+    law_proof,
     law_search,
     simulate_held_out,
 )
@@ -57,7 +59,7 @@ NOISE = 2e-5
 
 
 @lru_cache
-def slide(size: float) -> Campaign:
+def slide(size: float, noise_n: float = 0.2) -> Campaign:
     """Six paths of a slide whose friction has a bump of so many newtons about one place."""
     rng = np.random.default_rng(11)
     shots = []
@@ -70,8 +72,10 @@ def slide(size: float) -> Campaign:
         velocity = (sizes * rates) @ np.cos(angles)
         acceleration = -(sizes * rates**2) @ np.sin(angles)
         level = COULOMB + size * np.exp(-0.5 * ((position - CENTRE) / WIDTH) ** 2)
-        force = 2.0 * acceleration + level * np.tanh(velocity / 1e-3) + 0.2 * rng.standard_normal(time.size)
-        channels = Channel(time, force, 0.2), Channel(time, position, 1e-7)
+        force = (
+            2.0 * acceleration + level * np.tanh(velocity / 1e-3) + noise_n * rng.standard_normal(time.size)
+        )
+        channels = Channel(time, force, noise_n), Channel(time, position, 1e-7)
         shots.append(Capture(number, math.nan, math.nan, *channels))
     return Campaign(Excitation.DRIVEN, tuple(shots))
 
@@ -97,6 +101,31 @@ def test_a_bump_of_friction_is_found_at_its_place() -> None:
     function = sum(size * part for size, part in zip(sizes, parts, strict=True))
     error = (function - np.mean(function)) - (truth - truth.mean())
     assert np.abs(error).max() < 0.1 * 0.6
+
+
+def test_the_gap_that_is_told_for_a_law_is_that_of_its_file(tmp_path: Path) -> None:
+    """Without the bump a free delay takes over some of it, and rows count that know no direction."""
+    model = tmp_path / "slide.yaml"
+    free = "predicts: position", "force_offset: {std: free}\n  delay_s: {std: 0.002}"
+    model.write_text(
+        SLIDE_FILE.replace("predicts: force", free[0]).replace("force_offset: {std: free}", free[1])
+    )
+    campaign = slide(0.6, 0.005)
+    base, _ = read_base_model(model)
+    finding = investigate_machine(campaign, base)
+    law = finding.law
+    assert law is not None
+    assert finding.final.delay_s == pytest.approx(-6e-4, abs=1e-4)
+    assert law.model.delay_s == pytest.approx(0.0, abs=3e-5)
+    assert law.fall.after < 1.2
+    write_machine_findings(finding, campaign, tmp_path / "found", "slide")
+    text = (tmp_path / "found" / f"{law.place}.yaml").read_text()
+    [told] = re.findall(r"held-out gap after: '?([\d.]+)", text)
+    assert float(told) == pytest.approx(law.fall.after, rel=1e-3)
+    written, _ = read_base_model(tmp_path / "found" / f"{law.place}.yaml")
+    again = investigate_machine(campaign, written)
+    assert again.verdict == "no_gap"
+    assert again.fall.before == pytest.approx(law.fall.after, rel=0.01)
 
 
 def test_a_place_that_holds_is_not_lost_to_one_that_helps_in_a_single_block(
@@ -137,7 +166,8 @@ def test_where_held_out_blocks_do_not_confirm_the_best_place_the_next_is_tried(
         return replace(fall, p_value=p_values[-1]) if fall.low > 0.0 else fall
 
     monkeypatch.setattr(law_search, "best_spline", misleading)
-    monkeypatch.setattr(law_search, "fall_of_gap", with_p_value)
+    for module in (law_search, law_proof):
+        monkeypatch.setattr(module, "fall_of_gap", with_p_value)
     p_values.append(0.045)
     law = investigate_machine(slide(0.6), SLIDE).law
     assert law is not None

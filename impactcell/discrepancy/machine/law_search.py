@@ -29,6 +29,7 @@ from impactcell.discrepancy.machine.held_numbers import (
     held_numbers,
     sampling_step_s,
 )
+from impactcell.discrepancy.machine.law_proof import proved_form
 from impactcell.discrepancy.machine.law_refusal import GIVES_ENERGY, refusal_of
 from impactcell.discrepancy.machine.law_terms import LAW_PREFIX, term_of
 from impactcell.discrepancy.machine.look_alikes import one_way_note
@@ -197,8 +198,10 @@ class _LookedAt:
         choices = _choices(spline.form, ranked[:REFITTED], max(map(abs, tested)))
         laws = _Forms(fits, (*self.own, *choices), model, choices)
         chosen, equivalents = laws.condensed(spline.gains, self.before)
-        law_model, blocks = (smooth, self.held_out) if chosen is None else laws.fitted(chosen)
-        fall = fall_of_gap(blocks, model, law_model, finding.seed)
+        if chosen is None:
+            law_model, fall = smooth, fall_of_gap(self.held_out, model, smooth, finding.seed)
+        else:
+            law_model, fall = proved_form(fits, model, chosen, finding.seed)
         curve = spline_function(tangent, spline.penalty / variance, tested)
         simulated = None
         if chosen is not None and fall.is_real_among(tests):
@@ -255,7 +258,7 @@ class _Forms:
         forms: Sequence[TermChoice],
     ) -> None:
         self.fits, self.model, self.forms = fits, model, forms
-        self.training, self.held_out = fits.blocks(fits.rows_with(choices, splines))
+        self.training, _ = fits.blocks(fits.rows_with(choices, splines))
 
     def _fit_columns(self, form: TermChoice) -> list[Column]:
         return [*self.model.fit.columns, *ChosenTerm(form, 0.0).columns]
@@ -279,12 +282,6 @@ class _Forms:
         ]
         shortest = min(alike, key=lambda form: (_numbers(form), -float(gains[form].sum())))
         return shortest, tuple(form.law.name for form in alike if form is not shortest and form.law)
-
-    def fitted(self, form: TermChoice) -> tuple[FittedModel, Blocks]:
-        """Model with a form, and held-out blocks with its columns."""
-        fit = fit_blocks(self.training, self._fit_columns(form), self.fits.priors, self.fits.nonnegative)
-        terms = (*self.model.terms, ChosenTerm(form, 0.0))
-        return replace(self.model, terms=terms, fit=fit), self.held_out
 
 
 def _numbers(choice: TermChoice) -> int:
