@@ -25,6 +25,7 @@ COLUMNS: Mapping[Coordinate, Mapping[str, str]] = {
         "force_noise": "noise_std_n",
         "position_noise": "noise_std_m",
         "actuator_noise": "noise_std_m",
+        "speed_noise": "noise_std_m_per_s",
     },
     Coordinate.ROTATION: {
         "force": "torque_n_m",
@@ -35,6 +36,7 @@ COLUMNS: Mapping[Coordinate, Mapping[str, str]] = {
         "force_noise": "noise_std_n_m",
         "position_noise": "noise_std_rad",
         "actuator_noise": "noise_std_rad",
+        "speed_noise": "noise_std_rad_per_s",
     },
 }
 """Names of columns and keys in a campaign: where the coordinate is an angle, a force is a torque [N m],
@@ -59,10 +61,16 @@ class Sensor:
         Nominal sampling rate; the traces' own times are what counts.
     noise_std : float or None
         Standard deviation of the white noise, N or m.
+    summed_up : bool
+        A position that is the sum of a recorded speed.
+    speed_noise_std : float or None
+        Standard deviation of that speed's white noise, m/s.
     """
 
     rate_hz: float | None = None
     noise_std: float | None = None
+    summed_up: bool = False
+    speed_noise_std: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

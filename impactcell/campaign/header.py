@@ -12,6 +12,8 @@ from impactcell.records.plausible_range import STROKE_M
 
 FORMAT = 1
 """Version of the campaign directory."""
+SUMMED_UP = "summed_up_from_speed"
+"""Key of a position that is the sum of a recorded speed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,11 +105,27 @@ def _sensors(reader: "_Reader", top: dict[str, yaml.Node], coordinate: Coordinat
     sensors = {}
     nodes = reader.mapping(top.get("sensors"), "sensors", set(CHANNELS)) or {}
     for name, node in nodes.items():
-        noise_key = COLUMNS[coordinate][f"{name}_noise"]
-        keys = reader.mapping(node, f"sensors.{name}", {"rate_hz", noise_key}) or {}
-        rate = reader.number(keys.get("rate_hz"), f"sensors.{name}.rate_hz", None, positive=True)
-        noise = reader.number(keys.get(noise_key), f"sensors.{name}.{noise_key}", None, positive=True)
-        sensors[name] = Sensor(rate, noise)
+        noise_key, of_speed = (COLUMNS[coordinate][f"{one}_noise"] for one in (name, "speed"))
+        known = {"rate_hz", noise_key} | ({SUMMED_UP, of_speed} if name == "position" else set())
+        keys = reader.mapping(node, f"sensors.{name}", known) or {}
+        rate, noise, speed_noise = (
+            reader.number(keys.get(key), f"sensors.{name}.{key}", None, positive=True)
+            for key in ("rate_hz", noise_key, of_speed)
+        )
+        summed_up = reader.flag(keys.get(SUMMED_UP), f"sensors.{name}.{SUMMED_UP}")
+        if summed_up and noise is not None:
+            reader.fault(
+                keys[noise_key],
+                f"sensors.{name}.{noise_key}: noise of a speed adds up in the position; write the speed's, "
+                f"{of_speed}",
+            )
+        if speed_noise is not None and not summed_up:
+            reader.fault(
+                keys[of_speed],
+                f"sensors.{name}.{of_speed} is of a speed that was summed up; write {SUMMED_UP}: true "
+                f"beside it, or {noise_key}",
+            )
+        sensors[name] = Sensor(rate, noise, summed_up, speed_noise)
     return sensors
 
 
@@ -137,6 +155,15 @@ class _Reader:
             else:
                 nodes[text] = value
         return nodes
+
+    def flag(self, node: yaml.Node | None, name: str) -> bool:
+        """Value of a scalar that is true or false; false where there is none."""
+        if node is None or _is_null(node):
+            return False
+        value = node.value if isinstance(node, yaml.ScalarNode) else "a block"
+        if value not in ("true", "false"):
+            self.fault(node, f"{name} is {value!r}; it has to be true or false")
+        return bool(value == "true")
 
     def number(
         self,

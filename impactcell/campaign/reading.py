@@ -138,10 +138,18 @@ def _capture(file: Path, shot: ShotRow, header: Header | None, faults: Faults) -
         if sensor not in channels:
             return None
         time, values = channels[sensor]
-        noise_std = header.sensors.get(sensor, Sensor()).noise_std
+        said = header.sensors.get(sensor, Sensor())
+        noise_std = said.noise_std
         raster = raster_of(values)
         is_coarse = raster is not None and raster > FINE_RASTER * (noise_std or 0.0)
-        return Channel(time, values, noise_std, resolution=raster if is_coarse else None)
+        return Channel(
+            time,
+            values,
+            noise_std,
+            resolution=raster if is_coarse else None,
+            summed_up=said.summed_up,
+            speed_noise_std=said.speed_noise_std,
+        )
 
     return Capture(
         cycle=shot.number,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from impactcell.campaign.contents import CHANNELS, COLUMNS, Campaign, Coordinate
-from impactcell.campaign.header import FORMAT
+from impactcell.campaign.header import FORMAT, SUMMED_UP
 from impactcell.errors import CampaignError
 from impactcell.process.path_kind import Kind, kind_at
 from impactcell.process.whole_files import directory_beside
@@ -69,9 +69,12 @@ def _header(campaign: Campaign) -> str:
     if campaign.sensors:
         lines.append("sensors:")
     for name, sensor in campaign.sensors.items():
-        noise = "null" if sensor.noise_std is None else _text(sensor.noise_std)
         rate = "" if sensor.rate_hz is None else f"rate_hz: {_text(sensor.rate_hz)}, "
-        lines.append(f"  {name}: {{{rate}{COLUMNS[campaign.coordinate][f'{name}_noise']}: {noise}}}")
+        summed_up = f"{SUMMED_UP}: true, " if sensor.summed_up else ""
+        std = sensor.speed_noise_std if sensor.summed_up else sensor.noise_std
+        key = COLUMNS[campaign.coordinate][f"{'speed' if sensor.summed_up else name}_noise"]
+        noise = "null" if std is None else _text(std)
+        lines.append(f"  {name}: {{{rate}{summed_up}{key}: {noise}}}")
     return "\n".join(lines) + "\n"
 
 

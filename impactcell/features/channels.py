@@ -93,7 +93,7 @@ def check_channel(channel: Channel | None, name: str) -> CheckedChannel:
         raise CaptureError(f"the {name} is constant at {channel.values[0]:.6g}")
     return CheckedChannel(
         channel.time_s, channel.values, channel.noise_std, channel.full_scale, channel.resolution,
-        noise_std(channel), highest, plateau,
+        sigma=noise_std(channel), highest=highest, plateau=plateau,
     )  # fmt: skip
 
 
@@ -158,7 +158,7 @@ def check_force(channel: Channel | None) -> CheckedForce:
     smooth = force.values if width == 1 else running_mean(force.values, width)
     return CheckedForce(
         force.time_s, force.values, force.noise_std, force.full_scale, force.resolution,
-        force.sigma, force.highest, force.plateau, smooth=smooth,
+        sigma=force.sigma, highest=force.highest, plateau=force.plateau, smooth=smooth,
     )  # fmt: skip
 
 

@@ -150,7 +150,12 @@ def german_headline(result: Mapping[str, Any]) -> str:
                 said += f" {left}{_where(result)}."
     law = result.get("law")
     if law:
-        said += f" Ein Gesetz, das keine Bibliothek hat, passt dazu: {german_equation(law['equation'])}."
+        what = (
+            f"{german_effect(law['term'])} passt dazu, ist aber nicht benannt"
+            if law.get("term")
+            else "Ein Gesetz, das keine Bibliothek hat, passt dazu"
+        )
+        said += f" {what}: {german_equation(law['equation'])}."
     said += _follows(result.get("simulation"))
     return f"{said} (Abweichungen an zurückgehaltenen Messungen; 1 ist das Rauschen der Sensoren.)"
 

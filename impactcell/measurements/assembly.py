@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -78,6 +78,8 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     notes += (of_copies := _of_copies(records))
     is_swapped = looks_swapped(records)
     notes += [SWAPPED] if is_swapped else []
+    if (position := mapping.of(ColumnMeaning.POSITION)) is not None and position.summed_up:
+        captures = [_with_summed_position(capture) for capture in captures]
     if all(math.isnan(capture.mass_kg) for capture in captures):
         notes.append(_without_mass(coordinate))
     if excitation is Excitation.TAP and "stroke" not in given.constants:
@@ -188,6 +190,11 @@ def _of_sums(mapping: Mapping, excitation: Excitation) -> list[str]:
     return [f"position summed up from the speed {name!r}, {begun}"]
 
 
+def _with_summed_position(capture: Capture) -> Capture:
+    position = capture.position
+    return replace(capture, position=None if position is None else replace(position, summed_up=True))
+
+
 def _check_channels(records: Sequence[Record], mapping: Mapping, excitation: Excitation) -> None:
     needed = {
         Excitation.TAP: {ColumnMeaning.FORCE},
@@ -271,5 +278,6 @@ def _sensors(captures: Sequence[Capture]) -> dict[str, Sensor]:
                 np.diff(channel.time_s) for channel in channels if len(channel.time_s) > 1
             ]
             step = float(np.median(np.concatenate(steps))) if steps else math.nan
-            sensors[name] = Sensor(float(f"{1.0 / step:.6g}") if step > 0.0 else None, None)
+            rate_hz = float(f"{1.0 / step:.6g}") if step > 0.0 else None
+            sensors[name] = Sensor(rate_hz, None, any(channel.summed_up for channel in channels))
     return sensors

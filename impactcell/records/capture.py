@@ -43,6 +43,10 @@ class Channel:
         Smallest and largest value the channel can show; a sample at either end is saturated.
     resolution : float or None
         Value of one step of the sensor's integer code; None where values are not such multiples.
+    summed_up : bool
+        A position that is the sum of a recorded speed, whose noise adds up in it.
+    speed_noise_std : float or None
+        Standard deviation of that speed's white noise; None where it is not known.
     """
 
     time_s: Samples
@@ -50,6 +54,8 @@ class Channel:
     noise_std: float | None = None
     full_scale: tuple[float, float] | None = None
     resolution: float | None = None
+    summed_up: bool = False
+    speed_noise_std: float | None = None
 
 
 def since_contact(time_s: Samples) -> slice:

@@ -141,7 +141,7 @@ def test_a_stribeck_speed_is_found_between_the_points_of_its_grid() -> None:
 def test_a_kink_shifts_a_smoothed_speed_by_the_share_that_is_said(half: int) -> None:
     """At a kink on a sample; over more samples the shift comes near 5/64, over fewer it is larger."""
     time = np.arange(-200.0, 201.0)
-    smoothed, _ = smoothing.smoothed_speed(np.where(time > 0.0, 0.5 * time**2, 0.0), half, 1.0)
+    smoothed = smoothing.smoothed_speed(np.where(time > 0.0, 0.5 * time**2, 0.0), half, 1.0)
     shift = float(np.abs(smoothed - np.maximum(time, 0.0))[60:-60].max())
     assert shift == pytest.approx(KINK_SHARE * half, rel=0.06)
 

@@ -17,6 +17,7 @@ import impactcell
 from impactcell.api.machine_findings import write_machine_findings
 from impactcell.campaign import Campaign, Coordinate, Excitation, write
 from impactcell.cli.app import app
+from impactcell.discrepancy.laws import ATOMS, Shaped
 from impactcell.discrepancy.machine import (
     BaseModel,
     FallOfGap,
@@ -24,17 +25,26 @@ from impactcell.discrepancy.machine import (
     NumberPrior,
     OpenLoopError,
     Response,
+    TermChoice,
     investigate_machine,
     investigation,
     law_proof,
     law_search,
     simulate_held_out,
 )
+from impactcell.discrepancy.machine.base_model import LawForm
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.free_splines import FreeSpline
-from impactcell.discrepancy.report import machine_result
+from impactcell.discrepancy.machine.regression import LinearFit
+from impactcell.discrepancy.machine.trials import ChosenTerm
+from impactcell.discrepancy.report import (
+    german_machine_sentences,
+    german_notes,
+    machine_result,
+    machine_sentences,
+)
 from impactcell.errors import CampaignError, SettingsError
-from impactcell.german.findings import with_decimal_commas
+from impactcell.german.findings import german_effect, german_headline, with_decimal_commas
 from impactcell.records import Capture, Channel
 from impactcell.settings.base_model import read_base_model
 from tests.discrepancy.test_german_report import Told
@@ -184,6 +194,69 @@ def test_no_law_is_looked_for_where_nothing_remains() -> None:
     assert finding.verdict == "no_gap"
     assert finding.law is None
     assert not finding.law_refused
+
+
+def with_law_of(place: str, form: str, amplitude: float = 1.0) -> MachineFinding:
+    """Finding of a slide with a law of one atom in a place in the place of its own."""
+    finding = investigated(0.6)
+    assert finding.law is not None
+    [atom] = [atom for atom in ATOMS if atom.name == form]
+    choice = TermChoice(f"law_of_{place}", law=LawForm((Shaped((atom,), ((),)),), 0.2))
+    size = np.array([amplitude])
+    fit = LinearFit(ChosenTerm(choice, 0.0).columns, size, size, size, np.array([False]))
+    model = replace(finding.law.model, fit=fit)
+    law = replace(finding.law, place=f"law_of_{place}", choice=choice, model=model)
+    return replace(finding, law=law)
+
+
+@pytest.mark.parametrize(
+    ("place", "form", "term", "why", "warum"),
+    [
+        ("friction_over_speed", "u", "viscous friction", "the best term", ""),
+        ("friction_over_speed", "u^2", "quadratic drag", "the best term", ""),
+        ("friction_over_speed", "1", "Coulomb friction", "the base model has it", "das Grundmodell hat"),
+        ("force_over_position", "u", "restoring force", "the best term", ""),
+        ("force_over_position", "u^3", "hardening spring", "the best term", ""),
+        ("friction_over_load", "u", "load dependent friction", "on these records it looks", "sieht es aus"),
+    ],
+)
+def test_a_law_that_is_a_term_is_called_by_its_name(
+    place: str, form: str, term: str, why: str, warum: str
+) -> None:
+    finding = with_law_of(place, form)
+    law = finding.law
+    assert law is not None
+    reason = finding.steps[-1].reason
+    assert reason
+    said = machine_sentences.headline(finding)
+    assert "nobody had listed" not in said
+    assert f", {term}, would take the held-out gap to {law.fall.after:.2f}; it is not named, since " in said
+    tried = {trial.term.choice.name for trial in finding.steps[-1].trials}
+    known = law.listed in tried
+    assert (reason if known else why) in said
+    german = german_machine_sentences.headline(finding)
+    assert "brächte die Abweichung auf" in german
+    assert (german_notes.reason(reason)[1] if known else warum) in german
+    document = machine_result.machine_document(finding)
+    assert document["law"]["term"] == law.listed
+    assert f"{german_effect(law.listed)} passt dazu, ist aber nicht benannt" in german_headline(document)
+
+
+def test_that_intervals_do_not_include_what_remains_is_german_too() -> None:
+    language, german = german_notes.note(machine_result.OPEN_INTERVALS)
+    assert language == "de"
+    assert german.startswith("Die Intervalle des Benannten schließen nicht ein, was bleibt")
+
+
+def test_friction_that_gives_energy_and_other_forms_are_no_term() -> None:
+    for finding in (
+        with_law_of("friction_over_speed", "u", -1.0),
+        with_law_of("force_over_position", "u^2"),
+        investigated(0.6),
+    ):
+        assert finding.law is not None
+        assert finding.law.listed == ""
+        assert "a law that nobody had listed" in machine_sentences.headline(finding)
 
 
 def test_a_law_that_would_give_energy_is_refused() -> None:

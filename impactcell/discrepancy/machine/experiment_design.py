@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from impactcell.discrepancy.machine.base_model import Response, TermChoice
 from impactcell.discrepancy.machine.finding import MachineFinding
@@ -290,6 +291,8 @@ def _noisy(record: UniformRecord, finding: MachineFinding, rng: np.random.Genera
     """Record as its sensors would have it; what the final model leaves counts as noise of theirs."""
     level = max(finding.fall.after, 1.0)
     position, force = (level * std * rng.standard_normal(len(record.position)) for std in record.noise)
+    if record.summed_up:
+        position = cumulative_trapezoid(position, record.time_s, initial=0)
     if finding.base.response is Response.FORCE or np.ptp(record.force) > 0.0:
         record = replace(record, force=record.force + force)
     return replace(record, position=record.position + position)

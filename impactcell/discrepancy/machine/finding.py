@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from impactcell.discrepancy.data import MIN_HELD_OUT, MIN_TRAINING
 from impactcell.discrepancy.laws import FittedFunction
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
+from impactcell.discrepancy.machine.law_terms import listed_term
 from impactcell.discrepancy.machine.motion_scale import MotionScale
 from impactcell.discrepancy.machine.regression import Blocks, LinearFit
 from impactcell.discrepancy.machine.selection import SelectionStep
@@ -168,6 +169,12 @@ class MachineLaw:
     simulated: tuple[OpenLoopError, OpenLoopError] | None
     beside: tuple[str, ...] = ()
 
+    @property
+    def listed(self) -> str:
+        """Identifier of the term of the catalogue that this is; empty where it is none."""
+        columns = () if self.choice is None else ChosenTerm(self.choice, 0.0).columns
+        return listed_term(self.choice, [self.model.value(column) for column in columns])
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MachineFinding:
@@ -265,7 +272,7 @@ class MachineFinding:
         """Whether the equation of motion shows nothing beyond noise, and a simulation errs far beyond."""
         if not self.simulated or self.base.response is Response.FORCE or not self.is_at_floor:
             return False
-        error, noise = self.simulated[-1], max(record.sensor_noise[0] for record in self.records)
+        error, noise = self.simulated[-1], max(record.position_noise for record in self.records)
         return error.fit_percent < POOR_FIT_PERCENT and error.rmse > FAR_ABOVE_NOISE * noise
 
     @property

@@ -80,7 +80,10 @@ def _interpolated(record: UniformRecord, times: int) -> UniformRecord:
         return np.asarray(upfirdn(low_pass, values, times)[inner], dtype=np.float64)
 
     # A force between whose samples there are lines shows no noise at high frequencies.
-    is_known = record.noise_is_stated[0], record.noise_is_stated[1] or record.force_span > 1.0
+    is_known = (
+        record.noise_is_stated[0] or record.summed_up,
+        record.noise_is_stated[1] or record.force_span > 1.0,
+    )
     noise = [
         told if is_told or len(values) < LONG else min(told, highest_frequency(values)[1])
         for told, is_told, values in zip(

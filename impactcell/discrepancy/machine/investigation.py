@@ -16,6 +16,7 @@ from impactcell.discrepancy.machine.fine_sampling import finely_sampled
 from impactcell.discrepancy.machine.held_out_stretch import pulls_back
 from impactcell.discrepancy.machine.law_search import with_law
 from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.record_notes import notes_of_records
 from impactcell.discrepancy.machine.release import from_release
 from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.terms import CATALOGUE
@@ -162,17 +163,7 @@ def hold_what_cannot_be_seen(
     base: BaseModel, records: Sequence[UniformRecord]
 ) -> tuple[BaseModel, list[str]]:
     """Hold numbers of a base model that its records say nothing of, and say so."""
-    notes = []
-    spikes = sum(record.spikes for record in records)
-    if spikes:
-        samples = sum(2 * len(record.position) for record in records)
-        notes.append(f"{spikes} of {samples} samples stood far from their neighbours and were replaced.")
-    commands = sum(record.force_is_command for record in records)
-    if commands:
-        notes.append(
-            f"The force is held from one update to the next in {commands} of {len(records)} records: it was "
-            "taken for a command without noise, which acts from its sample to the next."
-        )
+    notes = notes_of_records(base, records)
     is_driven = any(np.ptp(record.force) > 0.0 for record in records)
     if not is_driven:
         notes += [

@@ -1,5 +1,6 @@
 """Terms by what a model chose: one of the catalogue, or a law that the catalogue does not have."""
 
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -13,6 +14,28 @@ LAW_PREFIX = "law_of_"
 """How the identifier of a law's place begins: `law_of_friction_over_speed`."""
 LAW_PLACES = {f"{LAW_PREFIX}{form}": form for form in FREE_FORMS}
 """Places where a law may act, by their identifiers, and the free form that stands there."""
+
+
+TERMS_OF_FORMS: Mapping[tuple[str, str], str] = {
+    ("friction_over_speed", "1"): "coulomb_friction",
+    ("friction_over_speed", "u"): "viscous_friction",
+    ("friction_over_speed", "u^2"): "quadratic_drag",
+    ("friction_over_load", "u"): "load_dependent_friction",
+    ("friction_over_position", "u"): "position_dependent_friction",
+    ("force_over_position", "u"): "restoring_force",
+    ("force_over_position", "u^3"): "hardening_spring",
+    ("force_over_speed", "u"): "directional_viscous_friction",
+}
+"""Terms of the catalogue by the place and the form of a law that is one of them."""
+
+
+def listed_term(choice: TermChoice | None, amplitudes: Sequence[float]) -> str:
+    """Give the identifier of the term of the catalogue that a law is; empty where it is none."""
+    if choice is None or choice.law is None:
+        return ""
+    identifier = TERMS_OF_FORMS.get((LAW_PLACES[choice.identifier], choice.law.name), "")
+    gives_energy = identifier and CATALOGUE[identifier].nonnegative and min(amplitudes) < 0.0
+    return "" if gives_energy else identifier
 
 
 def term_of(choice: TermChoice) -> Term:

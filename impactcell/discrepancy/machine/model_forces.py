@@ -9,7 +9,7 @@ import numpy as np
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.motion_scale import MotionScale, carried_load, half_supports, is_told
-from impactcell.discrepancy.machine.smoothing import smoothed_speed, speed_noise
+from impactcell.discrepancy.machine.smoothing import smoothed_speed
 from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import direction_of_motion
@@ -63,7 +63,7 @@ def motions(finding: MachineFinding) -> list[MotionState]:
     states = []
     for record in finding.records:
         _, narrow = half_supports(record, finding.scale)
-        velocity, _ = smoothed_speed(record.position, narrow, record.step_s)
+        velocity = smoothed_speed(record.position, narrow, record.step_s)
         gravity = finding.final.gravity
         load = carried_load(finding.base.response, record, record.force, (gravity, finding.scale))
         told = is_told(record, finding.scale)
@@ -81,7 +81,7 @@ def resistance(finding: MachineFinding, model: FittedModel) -> tuple[float, floa
     least, largest = math.inf, 0.0
     for record, motion in zip(finding.records, motions(finding), strict=True):
         _, narrow = half_supports(record, finding.scale)
-        noise = speed_noise(narrow, record.step_s) * record.noise[0]
+        noise = record.speed_noise(narrow)
         moving = np.abs(direction_of_motion(motion.velocity, finding.scale, noise)) == 1.0
         against = np.zeros(moving.shape)
         for chosen in model.terms:

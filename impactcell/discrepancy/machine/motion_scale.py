@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.channel_values import LARGEST
-from impactcell.discrepancy.machine.smoothing import smoothed_acceleration, speed_noise
+from impactcell.discrepancy.machine.smoothing import second_difference, smoothed_acceleration
 from impactcell.discrepancy.machine.uniform_records import MIN_HALF_SUPPORT, UniformRecord
 from impactcell.errors import CampaignError
 from impactcell.records import Samples
@@ -170,7 +170,8 @@ def _inertial_force(records: Sequence[UniformRecord], period_s: float) -> float 
         second = np.minimum(np.abs(second), np.quantile(np.abs(second), LARGEST_ACCELERATION))
         scale = (record.inertia / (span * record.step_s) ** 2) ** 2
         total += scale * float(second @ second)
-        noise += scale * 6.0 * len(second) * record.noise[0] ** 2  # variance of x - 2 y + z
+        gain = record.noise_gain(second_difference(span))
+        noise += scale * gain * len(second) * record.noise[0] ** 2
         count += len(second)
     if not count or noise > MAX_NOISE_SHARE * total:
         return None
@@ -183,10 +184,7 @@ def half_supports(record: UniformRecord, scale: MotionScale) -> tuple[int, int]:
     half = min(half, len(record.position) // 8)
     widest = max(int(SPEED_SUPPORT_SHARE * half), MIN_SPEED_SUPPORT)
     narrow = MIN_SPEED_SUPPORT
-    while (
-        narrow < widest
-        and speed_noise(narrow, record.step_s) * record.noise[0] > MAX_SPEED_NOISE * scale.speed
-    ):
+    while narrow < widest and record.speed_noise(narrow) > MAX_SPEED_NOISE * scale.speed:
         narrow += 1
     return half, narrow
 

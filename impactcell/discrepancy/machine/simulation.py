@@ -80,9 +80,10 @@ def _fit(rmse: float, varying: Samples) -> float:
 def needed_force(model: FittedModel, record: UniformRecord, stretch: slice, scale: MotionScale) -> Samples:
     """Force that the measured motion needs, averaged; nan where the part rests or turns, or a gap is near."""
     half = _half_average(record, scale)
-    velocity, noise = smoothed_speed(record.position, half_supports(record, scale)[1], record.step_s)
+    _, narrow = half_supports(record, scale)
+    velocity = smoothed_speed(record.position, narrow, record.step_s)
     acceleration = smoothed_acceleration(record.position, half, record.step_s)
-    direction = direction_of_motion(velocity, scale, noise * record.noise[0])
+    direction = direction_of_motion(velocity, scale, record.speed_noise(narrow))
     load = carried_load(Response.FORCE, record, record.force, (model.gravity, scale))
     covariates = {
         term.choice.covariate: np.full(velocity.shape, record.covariates.get(term.choice.covariate, 0.0))

@@ -8,16 +8,26 @@ TEST_FUNCTION_POWER = 4
 """w = (1 - s²)^4: three derivatives vanish at its ends [1]."""
 
 
-def smoothed_speed(position: Samples, half: int, step: float) -> tuple[Samples, float]:
-    """Differentiate by weighted slopes over `2 half + 1` samples: shape (n,), and noise per noise of one."""
+def smoothed_speed(position: Samples, half: int, step: float) -> Samples:
+    """Differentiate by weighted slopes over `2 half + 1` samples: shape (n,)."""
     weight = _slope(half) / step
     padded = np.pad(position, half, mode="reflect", reflect_type="odd")
-    return np.convolve(padded, weight[::-1], "valid"), speed_noise(half, step)
+    return np.convolve(padded, weight[::-1], "valid")
 
 
-def speed_noise(half: int, step: float) -> float:
-    """Noise of a smoothed speed per noise of a position."""
-    return float(np.linalg.norm(_slope(half))) / step
+def speed_noise(half: int, step: float, *, summed_up: bool = False) -> float:
+    """Noise of a smoothed speed per noise of a position, or of the speed that it is the sum of."""
+    weight = of_speeds(_slope(half), step) if summed_up else _slope(half)
+    return float(np.linalg.norm(weight)) / step
+
+
+def of_speeds(weight: Samples, step: float) -> Samples:
+    """Weights of speeds that are what these, which add up to 0, are of positions summed up from them.
+
+    By the trapezoidal rule.
+    """
+    after = -np.cumsum(weight)[:-1]  # of each difference of two positions
+    return np.convolve(after, [0.5 * step, 0.5 * step])
 
 
 def _slope(half: int) -> Samples:
@@ -39,6 +49,13 @@ def averaged(values: Samples, half: int, step: float) -> Samples:
     """Mean of a signal as the rows of the regression have it, shape (n,)."""
     weight, _ = test_function(half, step)
     return np.convolve(np.pad(values, half + 1, mode="reflect"), weight, "valid")
+
+
+def second_difference(span: int) -> Samples:
+    """Weights of x - 2 y + z, so many samples apart, shape (2 span + 1,)."""
+    weight = np.zeros(2 * span + 1)
+    weight[[0, span, -1]] = 1.0, -2.0, 1.0
+    return weight
 
 
 def bell(half: int) -> Samples:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response
 from impactcell.discrepancy.machine.channel_values import ABOUT, cleaned_position, held_mean, without_spikes
+from impactcell.discrepancy.machine.smoothing import of_speeds, speed_noise
 from impactcell.errors import CampaignError
 from impactcell.features import drive_noise_std, is_command, noise_std, samples_held, white_noise_std
 from impactcell.quality import gaps_in_time
@@ -37,11 +38,14 @@ class UniformRecord:
     spikes : int
         Samples that were replaced.
     noise : tuple of float
-        Standard deviation of position and force: as stated, else from third differences.
+        Standard deviation of position and force: as stated, else from third differences. Of a position that
+        was summed up from a speed it is the speed's.
     noise_is_stated : tuple of bool
     command : ndarray, shape (n,), or None
         Force that is held from its sample to the next, without noise: its mean from each sample to the next,
         where `force` is that from half a sample before to half a sample after; None of a measured one.
+    summed_up : bool
+        The position is the sum of a recorded speed, and so is its noise.
     force_span : float
         Values that one sample of the force makes, where it is held or sampled more slowly than the position.
     finer : int
@@ -65,6 +69,7 @@ class UniformRecord:
     finer: int = 1
     gaps: Gaps = ()
     command: Samples | None = None
+    summed_up: bool = False
 
     @property
     def force_is_command(self) -> bool:
@@ -112,6 +117,21 @@ class UniformRecord:
     def longest_piece(self) -> slice:
         """Longest of them."""
         return max(self.pieces(), key=lambda piece: piece.stop - piece.start, default=slice(0, 0))
+
+    def noise_gain(self, weight: Samples) -> float:
+        """Variance of the position's noise in a sum of so weighted samples, over `noise` squared."""
+        weights = of_speeds(weight, self.step_s) if self.summed_up else weight
+        return float(weights @ weights)
+
+    def speed_noise(self, half: int) -> float:
+        """Noise of a speed that is smoothed over so many samples on either side."""
+        return speed_noise(half, self.step_s, summed_up=self.summed_up) * self.noise[0]
+
+    @property
+    def position_noise(self) -> float:
+        """Standard deviation of the position as the sensors sample it; at its end where it was summed up."""
+        added_up = self.step_s * math.sqrt(self.finer * len(self.position)) if self.summed_up else 1.0
+        return self.sensor_noise[0] * added_up
 
     @property
     def sensor_noise(self) -> tuple[float, float]:
@@ -168,8 +188,7 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         half = 0.5 * step
         values[1] = held_mean(channels[1].time_s, channels[1].values, time - half, time + half)
         command = held_mean(channels[1].time_s, channels[1].values, time, time + step)
-    stated = shot.position.noise_std is not None
-    noise = noise_std(shot.position) if stated else white_noise_std(cleaned[0][0])
+    noise, stated = _position_noise(shot.position, cleaned[0][0])
     force_noise, force_span = 0.0, 1.0
     if shot.force is not None:
         force_noise, force_span = _force_noise(shot.force, cleaned[1][0], step)
@@ -193,7 +212,26 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         force_span=force_span,
         gaps=_gaps(channels, base.delay_s, begin),
         command=None if command is None else gain * command + base.force_offset.value,
+        summed_up=shot.position.summed_up,
     )
+
+
+def _position_noise(position: Channel, clean: Samples) -> tuple[float, bool]:
+    """Noise of a position, or of the speed that it was summed up from, and whether it is stated.
+
+    A mean of two speeds has a third difference of weights 1/2, -1, 0, 1 and -1/2: an eighth of the variance
+    that it would have of white noise.
+    """
+    if position.summed_up:
+        if position.speed_noise_std is not None:
+            return position.speed_noise_std, True
+        step_s = np.diff(position.time_s)
+        # Decimals were lost where the position was largest: by so much are speeds of one raster off it.
+        rounded_at = float(np.abs(clean).max() / step_s.min())
+        return math.sqrt(8.0) * white_noise_std(np.diff(clean) / step_s + rounded_at), False
+    if position.noise_std is not None:
+        return noise_std(position), True
+    return white_noise_std(clean), False
 
 
 def _force_noise(force: Channel, clean: Samples, step_s: float) -> tuple[float, float]:

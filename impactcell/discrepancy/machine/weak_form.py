@@ -121,12 +121,13 @@ def _record_rows(
     weight, curvature = test_function(half, step)
     pushing = weight if record.command is None else bell(half)
     slope = test_slope(pushing, step)
-    velocity, speed_noise = smoothed_speed(record.position, narrow, step)
+    velocity = smoothed_speed(record.position, narrow, step)
+    noise_of_speed = record.speed_noise(narrow)
     force = force_about(record, delay_s)
     load = carried_load(base.response, record, force, (gravity, scale))
     centres: IndexArray = np.arange(half + narrow, len(force) - half - narrow, half, dtype=np.int64)
     centres = centres[is_told(record, scale)[centres]]
-    direction = direction_of_motion(velocity, scale, record.noise[0] * speed_noise)
+    direction = direction_of_motion(velocity, scale, noise_of_speed)
     resting = _averaged((np.abs(direction) < 1.0).astype(np.float64), weight, centres)
     centres = centres[resting <= MAX_RESTING_SHARE]
     accelerating = record.inertia * _averaged(record.position, curvature, centres)
@@ -165,7 +166,7 @@ def _record_rows(
     # F(t + d) is linear in d about the delay of now, and counted from the one that is stated.
     columns["delay_s", 0.0, 0] = _averaged(force, slope, centres)
     target += (delay_s - base.delay_s.value) * columns["delay_s", 0.0, 0]
-    sensors = (record.inertia * record.noise[0]) ** 2 * float(curvature @ curvature)
+    sensors = (record.inertia * record.noise[0]) ** 2 * record.noise_gain(curvature)
     sensors += record.noise[1] ** 2 * float(weight @ weight)
     return Rows(
         target,
@@ -173,9 +174,7 @@ def _record_rows(
         np.zeros(target.size),
         record.time_s[centres],
         np.full(target.size, sensors),
-        _averaged(
-            doubt_of_direction(velocity, scale, record.noise[0] * speed_noise, narrow), weight, centres
-        ),
+        _averaged(doubt_of_direction(velocity, scale, noise_of_speed, narrow), weight, centres),
     )
 
 

@@ -8,7 +8,7 @@ from impactcell.discrepancy.report.german_notes import Patterns, note, reason
 from impactcell.discrepancy.report.german_sentences import equation, in_german, label, written
 from impactcell.discrepancy.report.german_words import phrase as channel_name
 from impactcell.discrepancy.report.german_words import term_name as phrase
-from impactcell.discrepancy.report.machine_sentences import law_equation, noise_keys
+from impactcell.discrepancy.report.machine_sentences import law_equation, noise_keys, why_not_named
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import german_open_loop_sentence
 from impactcell.physics.effect_names import as_title
@@ -92,10 +92,18 @@ def headline(finding: MachineFinding) -> str:
             beside = as_title(enumerated([held_number(phrase) for phrase in law.beside], "und"))
             bring = "bringt" if len(law.beside) == 1 else "bringen"
             said += f" {beside} {bring} sie auf {law.fall.before:.2f}; daneben:"
-        said += (
-            f" {equation(law_equation(law))}, bringt die Abweichung auf {law.fall.after:.2f}: "
-            "ein Gesetz, das keine Liste hatte."
-        )
+        if law.listed:
+            besides = "daneben " if finding.established else ""
+            why = reason(why_not_named(finding, law.listed))[1]
+            said += (
+                f" {equation(law_equation(law))}, {phrase(law.listed)}, brächte die Abweichung {besides}auf "
+                f"{law.fall.after:.2f}; benannt ist es nicht, denn: {why}."
+            )
+        else:
+            said += (
+                f" {equation(law_equation(law))}, bringt die Abweichung auf {law.fall.after:.2f}: "
+                "ein Gesetz, das keine Liste hatte."
+            )
     fit = finding.simulated[-1].fit_percent
     follows = german_open_loop_sentence(channel_name(finding.base.response), fit)
     return f"{written(said)} {follows}".rstrip()

@@ -136,6 +136,13 @@ NOTES: Final[Patterns] = (
     (r"The force is held from one update to the next in (\d+) of (\d+) records: .*",
      (r"Die Kraft wird in \1 von \2 Messungen von einem Wert zum nächsten gehalten: Sie gilt als Vorgabe "
       r"ohne Rauschen, die von ihrem Messwert bis zum nächsten wirkt.")),
+    (r"The intervals of what is named do not include what remains: .*",
+     "Die Intervalle des Benannten schließen nicht ein, was bleibt: Die Werte können außerhalb liegen."),
+    (r"The position was summed up from a speed in (\d+) of (\d+) records, .* state (\w+) in .*",
+     (r"Die Position ist in \1 von \2 Messungen aus einer Geschwindigkeit summiert, und deren Rauschen mit: "
+      r"Es ist aus benachbarten Werten der Geschwindigkeit abgelesen und gilt als weiß. War sie gefiltert "
+      r"oder aus den Schritten eines Encoders gebildet, ist es das nicht: \3 in campaign.yaml angeben oder "
+      r"die Position selbst aufzeichnen.")),
     (r"(An?\w* .+) would explain (\d+) % of what remains: (.+) finds it with everything else\.",
      lambda m: f"{said} erklärte {m[2]} % dessen, was bleibt: {key_of(m[3])} zeigt es mit allem "
      "anderen."
@@ -240,6 +247,11 @@ REASONS: Final[Patterns] = (
      f"({words_of(identifier_of(m[2]), 'de')}), dem {SIZES[m[5]]} Wert, der gesucht wird"),
     (r"a free form in the same place does much better than any named term",
      "eine freie Form an derselben Stelle ist viel besser als jeder benannte Term"),
+    (r"the base model has it", "das Grundmodell hat es schon"),
+    (r"on these records it looks like inertia, gravity or drive",
+     "in diesen Messungen sieht es aus wie Trägheit, Schwerkraft oder Antrieb"),
+    (r"another one explains more", "ein anderer Term erklärt mehr"),
+    (r"held-out records do not confirm it", "zurückgehaltene Messungen bestätigen es nicht"),
     (r"beside a remainder one term is named at most",
      "neben einem Rest wird höchstens ein Term genannt"),
 )  # fmt: skip

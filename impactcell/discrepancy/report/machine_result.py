@@ -25,6 +25,11 @@ from impactcell.discrepancy.search import MIN_OPEN_GAP
 ECCENTRIC_PARTS = ("position_eccentricity_cosine", "position_eccentricity_sine")
 """Names of the two amplitudes of an encoder that turns off its centre."""
 
+OPEN_INTERVALS = (
+    "The intervals of what is named do not include what remains: with it, values may lie beyond them."
+)
+"""What is said of intervals where a model leaves something."""
+
 
 def machine_document(finding: MachineFinding) -> dict[str, Any]:
     """Outcome as `result.json` has it."""
@@ -74,7 +79,11 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
             "training": len(finding.training),
             "held_out": len(finding.held_out),
         },
-        "notes": [*finding.notes, *notes_of_simulation(finding, (before, after))],
+        "notes": [
+            *finding.notes,
+            *([OPEN_INTERVALS] if finding.established and not finding.is_at_floor else []),
+            *notes_of_simulation(finding, (before, after)),
+        ],
         "seed": finding.seed,
         "model": "model.extended.yaml",
         "report": "report.html",
@@ -121,6 +130,7 @@ def _law(finding: MachineFinding) -> dict[str, Any]:
         "covariates": [covariate],
         "form": SPLINE_ONLY if law.choice is None or law.choice.law is None else law.choice.law.name,
         "equation": law_equation(law),
+        "term": law.listed or None,
         "parameters": {} if chosen is None else _law_parameters(finding, chosen),
         "equivalents": list(law.equivalents),
         "rival_places": [FREE_FORMS[LAW_PLACES[place]] for place in law.rival_places],

@@ -28,10 +28,17 @@ def headline(finding: MachineFinding) -> str:
         if law.beside:
             take = "takes" if len(law.beside) == 1 else "take"
             said += f" Beside {enumerated(law.beside, 'and')}, which {take} it to {law.fall.before:.2f},"
-        said += (
-            f" {law_equation(law)}, takes the held-out gap to {law.fall.after:.2f}: "
-            "a law that nobody had listed."
-        )
+        if law.listed:
+            beside = " beside it" if finding.established else ""
+            said += (
+                f" {law_equation(law)}, {phrase(law.listed)}, would take the held-out gap{beside} to "
+                f"{law.fall.after:.2f}; it is not named, since {why_not_named(finding, law.listed)}."
+            )
+        else:
+            said += (
+                f" {law_equation(law)}, takes the held-out gap to {law.fall.after:.2f}: "
+                "a law that nobody had listed."
+            )
     fit = finding.simulated[-1].fit_percent
     return f"{said} {open_loop_sentence(finding.base.response, fit, 'records')}".rstrip()
 
@@ -41,10 +48,23 @@ def law_equation(law: MachineLaw) -> str:
     return FREE_FORMS[LAW_PLACES[law.place]] if law.choice is None else term_of(law.choice).equation
 
 
+def why_not_named(finding: MachineFinding, name: str) -> str:
+    """Say why a term was not named that a law turned out to be."""
+    if name in finding.unconfirmed:
+        return "held-out records do not confirm it"
+    if name in {choice.name for choice in finding.base.terms}:
+        return "the base model has it"
+    tried = [step for step in finding.steps if name in {trial.term.choice.name for trial in step.trials}]
+    if not tried:
+        return "on these records it looks like inertia, gravity or drive"
+    return tried[-1].reason or "another one explains more"
+
+
 def noise_keys(finding: MachineFinding) -> list[str]:
     """Keys of `campaign.yaml` that state the noise of the sensors there are."""
     keys = COLUMNS[finding.base.coordinate]
-    return [keys[f"{channel}_noise"] for channel in ("force", "position")[not finding.is_driven :]]
+    moving = "speed" if any(record.summed_up for record in finding.records) else "position"
+    return [keys[f"{channel}_noise"] for channel in ("force", moving)[not finding.is_driven :]]
 
 
 def _conclusion(finding: MachineFinding) -> str:

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from impactcell.campaign import Excitation, read
+from impactcell.campaign import Campaign, Excitation, Sensor, read, write
 from impactcell.errors import CampaignError
+from impactcell.records import Capture, Channel
 
 HEADER = """\
 format: 1
@@ -336,3 +337,37 @@ def test_any_header_or_table_is_read_or_refused(tmp_path_factory: pytest.TempPat
         with pytest.raises(CampaignError):
             read(directory)
         (directory / name).write_bytes(kept)
+
+
+def test_a_position_that_was_summed_up_has_the_noise_of_its_speed(tmp_path: Path) -> None:
+    time = np.arange(5) * 0.1
+    channel = Channel(time, time**2, None, summed_up=True, speed_noise_std=0.02)
+    shots = (Capture(1, float("nan"), 1.0, None, channel),)
+    sensors = {"position": Sensor(10.0, None, summed_up=True, speed_noise_std=0.02)}
+    write(Campaign(Excitation.FREE_SLIDE, shots, sensors=sensors), tmp_path / "campaign")
+    file = tmp_path / "campaign" / "campaign.yaml"
+    text = file.read_text()
+    assert "position: {rate_hz: 10, summed_up_from_speed: true, noise_std_m_per_s: 0.02}" in text
+    got = read(tmp_path / "campaign")
+    assert got.sensors == sensors
+    assert got.shots[0].position is not None
+    assert (got.shots[0].position.summed_up, got.shots[0].position.speed_noise_std) == (True, 0.02)
+    assert got.shots[0].position.noise_std is None
+
+
+@pytest.mark.parametrize(
+    ("sensor", "said"),
+    [
+        ("summed_up_from_speed: true, noise_std_m: 1e-3", "noise of a speed adds up in the position"),
+        ("noise_std_m_per_s: 0.02", "is of a speed that was summed up; write summed_up_from_speed: true"),
+        ("summed_up_from_speed: maybe", "is 'maybe'; it has to be true or false"),
+    ],
+)
+def test_what_is_said_of_a_summed_position_is_checked(tmp_path: Path, sensor: str, said: str) -> None:
+    time = np.arange(5) * 0.1
+    shots = (Capture(1, float("nan"), 1.0, None, Channel(time, time**2)),)
+    write(Campaign(Excitation.FREE_SLIDE, shots), tmp_path / "campaign")
+    with (tmp_path / "campaign" / "campaign.yaml").open("a") as file:
+        file.write(f"sensors:\n  position: {{{sensor}}}\n")
+    with pytest.raises(CampaignError, match=re.escape(said)):
+        read(tmp_path / "campaign")

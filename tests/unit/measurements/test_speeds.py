@@ -33,6 +33,10 @@ def test_a_speed_that_is_given_as_the_position_is_summed_up() -> None:
     # of the trapezoidal rule h²/12 times the change of the derivative at most
     assert position == pytest.approx(0.4 / TURN_S * np.sin(TURN_S * TIME_S), abs=1e-6 * 0.4 * TURN_S / 6.0)
     assert coordinate is Coordinate.TRANSLATION
+    imported = make_campaign([recorded := table(FORCE, "m/s")], guess([recorded], DRIVEN))
+    assert imported.campaign.sensors["position"].summed_up
+    assert imported.campaign.shots[0].position is not None
+    assert imported.campaign.shots[0].position.summed_up
     assert "position summed up from the speed 'v', from 0 at the first sample of each record" in "\n".join(
         notes
     )

@@ -1,0 +1,32 @@
+"""What is said of records beside what is found in them: spikes, commands, positions that were summed up."""
+
+from collections.abc import Sequence
+
+from impactcell.campaign import COLUMNS
+from impactcell.discrepancy.machine.base_model import BaseModel
+from impactcell.discrepancy.machine.uniform_records import UniformRecord
+
+
+def notes_of_records(base: BaseModel, records: Sequence[UniformRecord]) -> list[str]:
+    """Say how records were taken."""
+    notes = []
+    spikes = sum(record.spikes for record in records)
+    if spikes:
+        samples = sum(2 * len(record.position) for record in records)
+        notes.append(f"{spikes} of {samples} samples stood far from their neighbours and were replaced.")
+    commands = sum(record.force_is_command for record in records)
+    if commands:
+        notes.append(
+            f"The force is held from one update to the next in {commands} of {len(records)} records: it was "
+            "taken for a command without noise, which acts from its sample to the next."
+        )
+    unstated = [record for record in records if record.summed_up and not record.noise_is_stated[0]]
+    if unstated:
+        key = COLUMNS[base.coordinate]["speed_noise"]
+        notes.append(
+            f"The position was summed up from a speed in {len(unstated)} of {len(records)} records, and its "
+            "noise adds up: that was read off neighbouring samples of the speed and taken for white. Of a "
+            "speed that was filtered, or made from an encoder's counts, it is not: "
+            f"state {key} in campaign.yaml, or record the position itself."
+        )
+    return notes
