@@ -40,6 +40,7 @@ from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.report import (
     german_machine_sentences,
     german_notes,
+    german_reasons,
     machine_result,
     machine_sentences,
 )
@@ -236,7 +237,7 @@ def test_a_law_that_is_a_term_is_called_by_its_name(
     assert (reason if known else why) in said
     german = german_machine_sentences.headline(finding)
     assert "brächte die Abweichung auf" in german
-    assert (german_notes.reason(reason)[1] if known else warum) in german
+    assert (german_reasons.reason(reason)[1] if known else warum) in german
     document = machine_result.machine_document(finding)
     assert document["law"]["term"] == law.listed
     assert f"{german_effect(law.listed)} passt dazu, ist aber nicht benannt" in german_headline(document)

@@ -4,7 +4,9 @@ from typing import Final
 
 from impactcell.discrepancy.machine import MachineFinding
 from impactcell.discrepancy.report.german_held_numbers import held_number
-from impactcell.discrepancy.report.german_notes import Patterns, note, reason
+from impactcell.discrepancy.report.german_notes import note
+from impactcell.discrepancy.report.german_patterns import Patterns
+from impactcell.discrepancy.report.german_reasons import reason
 from impactcell.discrepancy.report.german_sentences import equation, in_german, label, written
 from impactcell.discrepancy.report.german_words import phrase as channel_name
 from impactcell.discrepancy.report.german_words import term_name as phrase

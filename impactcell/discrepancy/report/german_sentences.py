@@ -6,7 +6,9 @@ from typing import Any, Final
 
 from impactcell.discrepancy.data import CHANNELS
 from impactcell.discrepancy.report import sentences
-from impactcell.discrepancy.report.german_notes import Patterns, note, reason
+from impactcell.discrepancy.report.german_notes import note
+from impactcell.discrepancy.report.german_patterns import Patterns
+from impactcell.discrepancy.report.german_reasons import reason
 from impactcell.discrepancy.report.german_words import phrase
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.report.sentences import NOT_SET

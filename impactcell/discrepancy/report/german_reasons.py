@@ -1,0 +1,90 @@
+"""Why no law is proposed and no further term named, in German."""
+
+from typing import Final
+
+from impactcell.discrepancy.report.german_held_numbers import held_number, key_of
+from impactcell.discrepancy.report.german_patterns import Patterns, marked, translated
+from impactcell.discrepancy.report.german_words import phrase, term_name
+from impactcell.german.parameters import words_of
+from impactcell.physics.effect_names import identifier_of
+
+SIZES: Final = {"smallest": "kleinsten", "largest": "größten"}
+"""Which end of what is looked for."""
+REASONS: Final[Patterns] = (
+    (r"of two covariates: (.*)",
+     lambda m: f"über zwei Größen: {said}" if (said := translated(m[1], REASONS)) else ""),
+    (r"on held-out (?:shots|blocks) the gap does not fall by more than chance",
+     "an Zurückgehaltenem fällt die Abweichung nicht mehr als durch Zufall"),
+    (r"on held-out shots it says no more than the best function of one by more than chance",
+     "an zurückgehaltenen Stößen sagt sie über die beste von einer Größe hinaus nur, was Zufall ist"),
+    (r"no second one was gone through far enough", "keine zweite wurde weit genug durchfahren"),
+    (r"the best term, ([^;]*), leaves (\S+) noise floors: [^;]* no function of ([^;]+?)( alone)?",
+     lambda m: f"der beste Term, {m[1]}, lässt {m[2]} Rauschschwellen übrig: was fehlt, ist keine Funktion "
+     f"{'allein ' if m[4] else ''}von {_in_words(m[3])}"),
+    (r"the term would give energy: ([^;]*) becomes negative in the range [^;]*",
+     r"der Term gäbe Energie ab: \1 wird im durchfahrenen Bereich negativ, also fehlt etwas anderes"),
+    (r"the smoothest spline predicts best, so that the data tell nothing of how the term bends",
+     "der glatteste Spline sagt am besten voraus, so dass die Daten nichts von einer Krümmung sagen"),
+    (r"shots over a wider range of ([^;]+) would",
+     lambda m: f"Stöße über einen größeren Bereich von {_in_words(m[1])} täten es"),
+    (r"the columns? ([^;]+) had fewer than (\d+) different values, [^;]*",
+     lambda m: f"zu wenig verschiedene Werte für eine Funktion (unter {m[2]}) hatte: "
+     f"{m[1].replace(' and ', ' und ')}"),
+    ((r"no function of speed, load or position that a spline of (\d+) pieces can follow helps block after "
+      r"block that it was not fitted to"),
+     (r"keine Funktion von Geschwindigkeit, Last oder Ort, der ein Spline aus \1 Stücken folgen kann, hilft "
+      r"in einem Block um den anderen, der nicht angepasst wurde")),
+    (r"(an?\w* .+) does as well as any function of speed, load or position",
+     lambda m: f"{said} erklärt es so gut wie jede Funktion von Geschwindigkeit, Last oder Ort"
+     if (said := held_number(m[1])) else ""),
+    ((r"(\w+[^;]* among the nuisances of the base model(?: or a free \w+)?|a free \w+ in the base model) "
+      r"would tell"),
+     lambda m: f"{key_of(m[1])} zeigte es"),
+    (r"simulated open loop, the law that fits best errs no less on held-out records than no law",
+     "ohne Rückführung simuliert irrt das beste Gesetz an Zurückgehaltenem nicht weniger als keines"),
+    ((r"the law that fits best stands in for the drive: with it the inertia would be (\S+) times what it is "
+      r"without"),
+     r"das beste Gesetz steht für den Antrieb: Mit ihm wäre die Trägheit das \1-fache von der ohne"),
+    (r"with the law that fits best friction would give energy in the range that was gone through",
+     "mit dem besten Gesetz gäbe die Reibung im durchfahrenen Bereich Energie ab"),
+    (r"no term does better in block after block that it was not fitted to",
+     "kein Term ist in einem Block um den anderen besser, der nicht angepasst wurde"),
+    (r"no term closes a fifth of the gap", "kein Term schließt ein Fünftel der Abweichung"),
+    (r"(an?\w* .+) would explain as much as the best term",
+     lambda m: f"{said} würde ebenso viel erklären wie der beste Term"
+     if (said := held_number(m[1])) else ""),
+    (r"(an?\w* .+) would explain more than the best term",
+     lambda m: f"{said} würde mehr erklären als der beste Term" if (said := held_number(m[1])) else ""),
+    (r"(an?\w* .+) would explain (\d+) % of it",
+     lambda m: f"{said} erklärte {m[2]} % davon" if (said := held_number(m[1])) else ""),
+    (r"no term stands out from what all of them close together",
+     "kein Term hebt sich von dem ab, was alle zusammen schließen"),
+    (r"(.+) comes nearest, at a (.+) of (\S+) (\S+), the (smallest|largest) that is looked for",
+     lambda m: f"„{term_name(identifier_of(m[1]))}“ kommt am nächsten, mit {m[3]} {m[4]} "
+     f"({words_of(identifier_of(m[2]), 'de')}), dem {SIZES[m[5]]} Wert, der gesucht wird"),
+    (r"a free form in the same place does much better than any named term",
+     "eine freie Form an derselben Stelle ist viel besser als jeder benannte Term"),
+    (r"the base model has it", "das Grundmodell hat es schon"),
+    (r"on these records it looks like inertia, gravity or drive",
+     "in diesen Messungen sieht es aus wie Trägheit, Schwerkraft oder Antrieb"),
+    (r"another one explains more", "ein anderer Term erklärt mehr"),
+    (r"held-out records do not confirm it", "zurückgehaltene Messungen bestätigen es nicht"),
+    (r"beside a remainder one term is named at most",
+     "neben einem Rest wird höchstens ein Term genannt"),
+)  # fmt: skip
+"""Why no law is proposed and no further term named: parts of a sentence."""
+
+
+def reason(english: str) -> tuple[str, str]:
+    """Say why nothing is proposed: in which language, and the reason.
+
+    >>> reason("no term closes a fifth of the gap")
+    ('de', 'kein Term schließt ein Fünftel der Abweichung')
+    >>> reason("no term closes a fifth of the gap; nobody knows why")
+    ('en', 'no term closes a fifth of the gap; nobody knows why')
+    """
+    return marked(english, translated(english, REASONS))
+
+
+def _in_words(english: str) -> str:
+    return " und ".join(phrase(identifier_of(name)) for name in english.split(" and "))
