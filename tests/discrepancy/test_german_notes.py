@@ -8,7 +8,14 @@ from types import FunctionType, ModuleType
 import pytest
 
 from impactcell.discrepancy.laws import finding as shot_laws
-from impactcell.discrepancy.machine import CATALOGUE, FREE_FORMS, investigation, law_refusal, selection
+from impactcell.discrepancy.machine import (
+    CATALOGUE,
+    FREE_FORMS,
+    investigation,
+    law_refusal,
+    record_notes,
+    selection,
+)
 from impactcell.discrepancy.report import (
     german_machine_sentences,
     german_sentences,
@@ -19,7 +26,10 @@ from impactcell.german.findings import with_decimal_commas
 from impactcell.quality import DataFault, Fault, channel_faults, motion_faults, notes_of
 from impactcell.quality import campaigns as campaign_faults
 
-FILLED = {"name": "force", "unit": "rad", "which": "force", "other": "position", "word": "upper"}
+FILLED = {
+    "name": "force", "key": "noise_std_rad_per_s", "unit": "rad", "which": "force",
+    "other": "position", "word": "upper",
+}  # fmt: skip
 """What the sources put into their sentences where it is a word; elsewhere a number stands."""
 
 
@@ -73,6 +83,7 @@ def test_every_kind_of_fault_has_a_german_name() -> None:
         (law_refusal.refusal_of, 3),
         (selection._refusal, 3),
         (selection.select_terms, 8),
+        (machine_sentences.why_not_named, 3),
     ],
 )
 def test_every_reason_for_naming_nothing_is_said_in_german(code: FunctionType, least: int) -> None:
@@ -100,9 +111,10 @@ def test_a_reason_of_one_covariate_and_of_two() -> None:
 
 def test_notes_on_a_machine_are_said_in_german() -> None:
     texts = sentences_of(investigation.hold_what_cannot_be_seen, 6)
+    texts += sentences_of(record_notes.notes_of_records, 6)
     notes = [text for text in texts if text[0].isupper() or text[0].isdigit()]
     notes = [note for note in notes if not note.startswith("Hold numbers")]
-    assert len(notes) == 5
+    assert len(notes) == 6
     alike = "periodic force, covariate friction(oil): on these records like inertia, gravity or drive, and so"
     beside = "covariate_friction(oil) shows only beside quadratic_drag, which hides it on these records;"
     off = "Simulated open loop, held-out records are 0.2 N m off with it, 0.1 without."
