@@ -139,6 +139,24 @@ def test_the_gap_that_is_told_for_a_law_is_that_of_its_file(tmp_path: Path) -> N
     assert again.fall.before == pytest.approx(law.fall.after, rel=0.01)
 
 
+def test_a_law_is_proved_where_the_base_model_has_no_dry_friction() -> None:
+    """Rows are weighed by its level, and there was no column for it: a traceback."""
+    shots = []
+    for shot in slide(0.0).shots:
+        force, position = shot.force, shot.position
+        assert force is not None
+        assert position is not None
+        speed = np.gradient(position.values, position.time_s)
+        bump = 0.6 * np.exp(-0.5 * ((position.values - CENTRE) / WIDTH) ** 2)
+        moved = force.values - COULOMB * np.tanh(speed / 1e-3) + 4.0 * speed + bump
+        shots.append(replace(shot, force=replace(force, values=moved)))
+    base = replace(SLIDE, terms=(TermChoice("viscous_friction"),))
+    law = investigate_machine(replace(slide(0.0), shots=tuple(shots)), base).law
+    assert law is not None
+    assert law.place == "law_of_force_over_position"
+    assert law.fall.after < 1.2 < law.fall.before
+
+
 def test_a_place_that_holds_is_not_lost_to_one_that_helps_in_a_single_block(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
