@@ -39,6 +39,8 @@ class FreeSlideFit:
     mu_k, mu_k_std : float
         The standard deviation is that of the residuals, of samples or of intervals, whichever is larger, and
         of the position's scale, which mu_k follows.
+    common_std : float
+        What all slides of a recorder share of it: that of the scale.
     bend : float
         How far friction at either end of the slide is from mu_k, as the residuals have it.
     gap : float
@@ -51,6 +53,7 @@ class FreeSlideFit:
 
     mu_k: float
     mu_k_std: float
+    common_std: float
     bend: float
     gap: float
     chi2: float
@@ -114,6 +117,7 @@ def fit_free_slide(capture: Capture, gravity_m_s2: float, plant: Plant | None = 
     return FreeSlideFit(
         mu_k=mu_k,
         mu_k_std=math.hypot(std, capture.position_scale_std * mu_k),
+        common_std=capture.position_scale_std * mu_k,
         bend=3.0 * abs(cubic) / stop_s**2 / gravity_m_s2,
         gap=spread / position.sigma,
         chi2=chi2,
@@ -130,8 +134,9 @@ def is_missed(fits: Sequence[FreeSlideFit]) -> bool:
 def free_slide_friction(fit: FreeSlideFit, reason: str = "", *, missed: bool = False) -> Coefficient:
     """Give mu_k of a slide; of one that is `missed` it is less sure by how far its friction bends."""
     if not missed:
-        return Coefficient(fit.mu_k, fit.mu_k_std, Quality.GOOD, reason)
-    return Coefficient(fit.mu_k, math.hypot(fit.mu_k_std, fit.bend), Quality.UNCERTAIN, reason)
+        return Coefficient(fit.mu_k, fit.mu_k_std, Quality.GOOD, reason, fit.common_std)
+    std = math.hypot(fit.mu_k_std, fit.bend)
+    return Coefficient(fit.mu_k, std, Quality.UNCERTAIN, reason, fit.common_std)
 
 
 def _path(

@@ -62,6 +62,7 @@ def test_mu_k_follows_the_scale_of_the_position_and_its_std_says_so() -> None:
         assert found.mu_k_std == pytest.approx(
             math.hypot(noise_alone.mu_k_std, scale_std * found.mu_k), rel=1e-9
         )
+        assert free_slide_friction(found).common_std == pytest.approx(scale_std * found.mu_k, rel=1e-12)
     assert exact.position is not None
     larger = replace(exact, position=replace(exact.position, values=1.003 * exact.position.values))
     assert fit_free_slide(larger, GRAVITY).mu_k == pytest.approx(1.003 * noise_alone.mu_k, rel=1e-6)
