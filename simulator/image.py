@@ -33,14 +33,12 @@ class RegisterImage:
 
     def put_code(self, name: str, words: Sequence[str]) -> None:
         """Show the code of the first of these words that the register has one for, if it has any."""
-        numbers = {word: number for number, word in self._codes(name).items()}
-        for word in words:
-            if word in numbers:
-                self._image.put(name, numbers[word])
-                return
-
-    def _codes(self, name: str) -> Mapping[int, str]:
-        return self.registers[name].codes if name in self.registers else {}
+        if name not in self.registers:
+            return
+        numbers = {word: number for number, word in self.registers[name].codes.items()}
+        shown = next((numbers[word] for word in words if word in numbers), None)
+        if shown is not None:
+            self._image.put(name, shown)
 
     def get(self, name: str) -> Any:
         """Return what a register shows."""

@@ -19,9 +19,9 @@ ROW_BYTES = 1024
 """What one of them takes, about: an alarm has its message in two languages."""
 _ROWS = 1024
 """Of these, dropped at a time: about as many bytes as `_CHUNK` captures."""
-_NS_PER_DAY = 86_400 * 10**9
+NS_PER_DAY = 86_400 * 10**9
 """Nanoseconds of a day."""
-SETTLED_NS = _NS_PER_DAY // 4
+SETTLED_NS = NS_PER_DAY // 4
 """So long cycles have to come by a clock that has leapt, before their time makes others old."""
 PRUNE_LIMIT = 512
 """Captures, and cycles, dropped at once: after a long rest, or with a shorter retention, gigabytes may have
@@ -58,7 +58,7 @@ def borne_out_ns(database: sqlite3.Connection, now_ns: int) -> int:
     """
     query = "SELECT max(time_ns) FROM cycles WHERE time_ns > 0 AND time_ns <= ?"
     (newest_ns,) = database.execute(query, (now_ns - SETTLED_NS,)).fetchone()
-    return now_ns if newest_ns is None else min(now_ns, newest_ns + SETTLED_NS + _NS_PER_DAY)
+    return now_ns if newest_ns is None else min(now_ns, newest_ns + SETTLED_NS + NS_PER_DAY)
 
 
 def prune(
@@ -78,8 +78,8 @@ def prune(
     bool
         Whether there may be more to drop; a call drops no more than `PRUNE_LIMIT` for each reason.
     """
-    oldest_ns = now_ns - int(keep.days * _NS_PER_DAY)
-    oldest_capture_ns = now_ns - int(min(keep.captures_days, keep.days) * _NS_PER_DAY)
+    oldest_ns = now_ns - int(keep.days * NS_PER_DAY)
+    oldest_capture_ns = now_ns - int(min(keep.captures_days, keep.days) * NS_PER_DAY)
     captures = database.execute(
         "DELETE FROM captures WHERE seq IN (SELECT seq FROM cycles WHERE time_ns > 0 AND time_ns < ? "
         "AND EXISTS (SELECT 1 FROM captures WHERE captures.seq = cycles.seq) ORDER BY time_ns LIMIT ?)",

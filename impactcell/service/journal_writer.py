@@ -8,7 +8,7 @@ from pathlib import Path
 
 from impactcell.errors import JournalDamagedError, JournalError, JournalGoneError
 from impactcell.journal.database import set_aside
-from impactcell.journal.retention import SETTLED_NS, Retention
+from impactcell.journal.retention import NS_PER_DAY, SETTLED_NS, Retention
 from impactcell.journal.salvage import salvaged_state
 from impactcell.journal.store import Journal
 from impactcell.journal.stored_forms import upgraded_state
@@ -22,7 +22,7 @@ CHECKPOINT_EVERY = 24
 wait for that."""
 PRUNE_EVERY = 256
 """Cycles between two looks at what the journal may drop."""
-AHEAD_NS = 7 * 86_400 * 10**9
+AHEAD_NS = 7 * NS_PER_DAY
 """A clock further ahead of the cycles before is told, nanoseconds; a machine may stand over a holiday."""
 
 Entry = Callable[[Journal], None]
@@ -165,7 +165,7 @@ class JournalWriter:
             self._log.warning(
                 "the last cycle is dated over %d days after those before: unless the machine stood so long, "
                 "set the clock right; nothing is dropped for it before cycles have come for %g h",
-                (now_ns - borne_out_ns) // (86_400 * 10**9), SETTLED_NS / 3.6e12,
+                (now_ns - borne_out_ns) // NS_PER_DAY, SETTLED_NS / 3.6e12,
             )  # fmt: skip
         self._said_ahead = is_ahead
         return borne_out_ns

@@ -42,7 +42,11 @@ class RefusedCertificate:
 async def system(context: PageContext, request: Request, session: BrowserSession) -> Response:
     """Show the system; users and certificates only to engineers."""
     views = context.feed.views
-    cells = [await _cell_system(context, facts, views[facts.name]) for facts in context.content.cells]
+    sizes = await context.past.run(lambda: [_size(facts.journal) for facts in context.content.cells])
+    cells = [
+        _cell_system(facts, views[facts.name], size)
+        for facts, size in zip(context.content.cells, sizes, strict=True)
+    ]
     users: list[User] = []
     certificates: list[RefusedCertificate] = []
     if session.actor.role >= Role.ENGINEER:
@@ -96,14 +100,14 @@ def _users(path: Path) -> list[User]:
         return []
 
 
-async def _cell_system(context: PageContext, facts: CellFacts, view: CellView) -> CellSystem:
-    journal = facts.journal
-    size = 0 if journal is None else await context.past.run(lambda: _size(journal))
+def _cell_system(facts: CellFacts, view: CellView, size: int) -> CellSystem:
     fault = view.conditions.get(journal_fault.NAME)
     return CellSystem(facts, view.status, size, fault if fault is not None and fault.active else None)
 
 
-def _size(journal: Path) -> int:
-    """Give the size of a journal with its log, in bytes."""
+def _size(journal: Path | None) -> int:
+    """Give the size of a journal with its log, in bytes; 0 where there is none."""
+    if journal is None:
+        return 0
     files = (journal, journal.with_name(journal.name + "-wal"))
     return sum(path.stat().st_size for path in files if path.exists())

@@ -9,7 +9,6 @@ from scipy.integrate import cumulative_trapezoid
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, TermChoice, investigate_machine
-from impactcell.discrepancy.machine.smoothing import speed_noise
 from impactcell.discrepancy.machine.uniform_records import uniform_records
 from impactcell.discrepancy.report.german_notes import note as german_note
 from impactcell.discrepancy.report.machine_result import machine_document
@@ -90,5 +89,5 @@ def test_noise_of_sums_is_that_of_many_draws() -> None:
     lever = np.arange(-4.0, 5.0)
     second, fourth, sixth = ((lever**power).sum() for power in (2, 4, 6))
     slope = (sixth * lever - fourth * lever**3) / (second * sixth - fourth**2) / STEP_S
-    assert speed_noise(4, STEP_S, summed_up=True) == pytest.approx(np.std(draws @ slope), rel=0.05)
+    assert record.speed_noise(4) == pytest.approx(np.std(draws @ slope), rel=0.05)
     assert record.position_noise == pytest.approx(STEP_S * math.sqrt(4000))

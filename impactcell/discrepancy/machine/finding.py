@@ -172,7 +172,9 @@ class MachineLaw:
     @property
     def listed(self) -> str:
         """Identifier of the term of the catalogue that this is; empty where it is none."""
-        columns = () if self.choice is None else ChosenTerm(self.choice, 0.0).columns
+        if self.choice is None:
+            return ""
+        columns = ChosenTerm(self.choice, 0.0).columns
         return listed_term(self.choice, [self.model.value(column) for column in columns])
 
 

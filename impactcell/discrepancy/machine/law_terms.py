@@ -29,9 +29,9 @@ TERMS_OF_FORMS: Mapping[tuple[str, str], str] = {
 """Terms of the catalogue by the place and the form of a law that is one of them."""
 
 
-def listed_term(choice: TermChoice | None, amplitudes: Sequence[float]) -> str:
+def listed_term(choice: TermChoice, amplitudes: Sequence[float]) -> str:
     """Give the identifier of the term of the catalogue that a law is; empty where it is none."""
-    if choice is None or choice.law is None:
+    if choice.law is None:
         return ""
     identifier = TERMS_OF_FORMS.get((LAW_PLACES[choice.identifier], choice.law.name), "")
     gives_energy = identifier and CATALOGUE[identifier].nonnegative and min(amplitudes) < 0.0

@@ -10,15 +10,9 @@ TEST_FUNCTION_POWER = 4
 
 def smoothed_speed(position: Samples, half: int, step: float) -> Samples:
     """Differentiate by weighted slopes over `2 half + 1` samples: shape (n,)."""
-    weight = _slope(half) / step
+    weight = slope_weights(half) / step
     padded = np.pad(position, half, mode="reflect", reflect_type="odd")
     return np.convolve(padded, weight[::-1], "valid")
-
-
-def speed_noise(half: int, step: float, *, summed_up: bool = False) -> float:
-    """Noise of a smoothed speed per noise of a position, or of the speed that it is the sum of."""
-    weight = of_speeds(_slope(half), step) if summed_up else _slope(half)
-    return float(np.linalg.norm(weight)) / step
 
 
 def of_speeds(weight: Samples, step: float) -> Samples:
@@ -30,7 +24,7 @@ def of_speeds(weight: Samples, step: float) -> Samples:
     return np.convolve(after, [0.5 * step, 0.5 * step])
 
 
-def _slope(half: int) -> Samples:
+def slope_weights(half: int) -> Samples:
     """Weights of the slope of a cubic in its middle: a parabola of the speed within them leaves no error."""
     lever = np.arange(-half, half + 1.0)
     second, fourth, sixth = (float(np.sum(lever**power)) for power in (2, 4, 6))

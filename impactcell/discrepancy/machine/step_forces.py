@@ -28,14 +28,15 @@ class Drive(NamedTuple):
 
 
 def drive_of(record: UniformRecord, stretch: slice, delay_s: float, every: int = 1) -> Drive:
-    """Drive of a stretch, where the force was recorded `delay_s` late, at every so many samples.
+    """Drive of a stretch, where the force was recorded `delay_s` late.
 
-    A command acts from its sample to the next; what was measured goes from one to the next in a line.
+    A command acts from its sample to the next; what was measured goes from one to the next in a line, at
+    every so many samples.
     """
-    time_s = record.time_s[stretch]
+    time_s = record.time_s[stretch] + delay_s
     if record.command is not None:
-        return _held(record, record.command, time_s[::every] + delay_s, every * record.step_s)
-    force = np.interp(time_s + delay_s, record.time_s, record.force)
+        return _held(record, record.command, time_s)
+    force = np.interp(time_s, record.time_s, record.force)
     return _in_lines(force if every == 1 else uniform_filter1d(force, every, mode="nearest")[::every])
 
 
@@ -66,7 +67,7 @@ def _in_lines(force: Samples) -> Drive:
     return Drive(force, over)
 
 
-def _held(record: UniformRecord, command: Samples, begin_s: Samples, step_s: float) -> Drive:
+def _held(record: UniformRecord, command: Samples, begin_s: Samples) -> Drive:
     """Mean command over each part: what its impulse grows by."""
     edges = np.append(record.time_s, record.time_s[-1] + record.step_s)
     impulse = np.concatenate([[0.0], np.cumsum(command * record.step_s)])
@@ -78,7 +79,7 @@ def _held(record: UniformRecord, command: Samples, begin_s: Samples, step_s: flo
         return grown
 
     def over(parts: int, gain: float, offset: float) -> Samples:
-        at = begin_s[:, None] + step_s * np.arange(parts + 1) / parts
-        return gain * np.diff(impulse_at(at), axis=1) * (parts / step_s) + offset
+        at = begin_s[:, None] + record.step_s * np.arange(parts + 1) / parts
+        return gain * np.diff(impulse_at(at), axis=1) * (parts / record.step_s) + offset
 
     return Drive(over(1, 1.0, 0.0)[:, 0], over)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response
 from impactcell.discrepancy.machine.channel_values import ABOUT, cleaned_position, held_mean, without_spikes
-from impactcell.discrepancy.machine.smoothing import of_speeds, speed_noise
+from impactcell.discrepancy.machine.smoothing import of_speeds, slope_weights
 from impactcell.errors import CampaignError
 from impactcell.features import drive_noise_std, is_command, noise_std, samples_held, white_noise_std
 from impactcell.quality import gaps_in_time
@@ -125,7 +125,7 @@ class UniformRecord:
 
     def speed_noise(self, half: int) -> float:
         """Noise of a speed that is smoothed over so many samples on either side."""
-        return speed_noise(half, self.step_s, summed_up=self.summed_up) * self.noise[0]
+        return math.sqrt(self.noise_gain(slope_weights(half))) / self.step_s * self.noise[0]
 
     @property
     def position_noise(self) -> float:

@@ -147,8 +147,9 @@ def _record_rows(
                 raw[choice.name, shape, number] = -direction * feature if term.is_friction else feature
     motion = MotionState(record.position, velocity, load, one)
     raw |= free_columns(motion, direction, scale.ranges, basis)
-    columns = {name: _averaged(values, weight, centres) for name, values in raw.items()}
-    columns[GAIN] = _averaged(force, pushing, centres)
+    columns = {
+        name: _averaged(values, pushing if name == GAIN else weight, centres) for name, values in raw.items()
+    }
     if base.coordinate is Coordinate.ROTATION:
         # The angle is what is read less e_c cos q + e_s sin q: to first order a force by inertia and gravity.
         for number, wave in enumerate(eccentricity_waves(record.position)):
@@ -162,7 +163,8 @@ def _record_rows(
         columns[GAIN] = gravity * columns["gravity_torque", 0.0, 0] - accelerating
     gravitating = base.gravity_torque.value * np.sin(record.position)
     target = accelerating - _averaged(force - gravitating, weight, centres)
-    target -= _averaged(force, pushing - weight, centres)
+    if pushing is not weight:
+        target -= _averaged(force, pushing - weight, centres)
     # F(t + d) is linear in d about the delay of now, and counted from the one that is stated.
     columns["delay_s", 0.0, 0] = _averaged(force, slope, centres)
     target += (delay_s - base.delay_s.value) * columns["delay_s", 0.0, 0]
