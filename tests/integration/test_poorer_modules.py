@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import re
 import sqlite3
 from pathlib import Path
 from typing import Any
@@ -82,5 +83,5 @@ async def test_a_cell_runs_on_a_module_that_has_less(kind: str, tmp_path: Path) 
         assert "force       no samples; the module says " in out
     else:
         assert {row["estimator"] for row in rows} == {"waveform"}
-        assert "status      ready, session " in out
+        assert re.search(r"status      (not )?ready, session ", out)  # between two taps, or during one
         assert "one buffer" in out
