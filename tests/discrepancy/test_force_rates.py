@@ -57,10 +57,13 @@ def measured(
 @pytest.mark.parametrize("stated", [True, False])
 @pytest.mark.parametrize("force_hz", [50.0, 100.0, 730.0, 2000.0])
 def test_no_gap_is_seen_whatever_the_rate_of_the_force(force_hz: float, *, stated: bool) -> None:
-    """At a tenth of the position's its noise was too small by the root of ten: the verdict was unknown."""
+    """At a tenth of the position's its noise was too small by the root of ten: the verdict was unknown.
+
+    Somewhat less than a floor is left: where the part turns, friction counts as uncertain by all of itself.
+    """
     finding = investigate_machine(measured(force_hz, stated=stated), SLIDE)
     assert finding.verdict == "no_gap"
-    assert 0.75 < finding.train_gaps[0] < 1.2
+    assert 0.7 < finding.train_gaps[0] < 1.2
     assert machine_document(finding)["noise_floor"]["noise_std"][0] == pytest.approx(NOISE_N, rel=0.1)
 
 

@@ -9,15 +9,20 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import minimize_scalar
 
 from impactcell.discrepancy.machine.weak_form import Rows
 from impactcell.records import Samples
 
-DIRECTION_STD = 1.0 / math.sqrt(3.0)
-"""Standard deviation of what may be anything between -1 and 1."""
+DIRECTION_STD = 1.0
+"""Standard deviation of what is -1 or 1, the largest that anything between them can have: a part that stops
+with the drive still on it is held by nearly all of its friction [1]."""
 MOST_FLOORS = 1e6
 """Noise floors that a model may leave at most [1]."""
+FLOORS_TRIED = 200
+"""Of them that are tried, before what lies between two of them."""
+FLOORS_TOLERANCE = 1e-6
+"""Relative, of what a model leaves [1]."""
 
 
 class DirectionDoubt(NamedTuple):
@@ -63,18 +68,25 @@ def weighed(rows: Rows, doubt: DirectionDoubt) -> Rows:
 def floors_left(rows: Rows, residual: Samples, chosen: np.ndarray, friction: float) -> float:
     """Noise floors g, at least 1, that a model leaves beside the doubt of direction.
 
-    Solves sum r² / (g² variance + u²) = n over the rows that are `chosen`, r unweighed.
+    Of the largest likelihood of r ~ N(0, g² variance + u²) over the rows that are `chosen`, r unweighed: rows
+    that doubt outweighs tell next to nothing of g, however far u is from what they leave.
     """
     square, variance = residual[chosen] ** 2, rows.variance[chosen]
     doubt = _doubt(rows, friction)[chosen]
 
-    def excess(log_floors: float) -> float:
-        return float(np.mean(square / (math.exp(2.0 * log_floors) * variance + doubt))) - 1.0
+    def cost(log_floors: float) -> float:
+        expected = math.exp(2.0 * log_floors) * variance + doubt
+        return float(np.sum(np.log(expected) + square / expected))
 
-    if not square.size or excess(0.0) <= 0.0:
+    if not square.size:
         return 1.0
-    most = math.log(MOST_FLOORS)
-    return math.exp(brentq(excess, 0.0, most)) if excess(most) < 0.0 else MOST_FLOORS
+    if not np.isfinite(square).all():
+        return MOST_FLOORS
+    grid = np.linspace(0.0, math.log(MOST_FLOORS), FLOORS_TRIED)
+    best = int(np.argmin([cost(log_floors) for log_floors in grid]))
+    around = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
+    between = minimize_scalar(cost, bounds=around, method="bounded", options={"xatol": FLOORS_TOLERANCE})
+    return math.exp(grid[best] if cost(grid[best]) <= between.fun else between.x)
 
 
 def _doubt(rows: Rows, friction: float) -> Samples:
