@@ -10,6 +10,7 @@ from dataclasses import replace
 from impactcell.errors import NotConvergedError, PredictionError
 from impactcell.features import Features
 from impactcell.prediction.joint_plant_fit import fit_plant
+from impactcell.prediction.phase_reweighting import MISFIT_THRESHOLD
 from impactcell.prediction.plant_fit import PlantFit
 from impactcell.records import Capture, as_recorded, sampling_step_s, with_open_onset
 
@@ -18,7 +19,7 @@ ONSET_STD_S = 5e-5
 MIN_FALL = 0.03
 """Fall of the squared gap from which on taps say that contact was elsewhere: three times what noise makes."""
 GAP_ENOUGH = 1.05
-"""Gap that has to be reached: what is missing elsewhere in the model is no matter of first contact."""
+"""Gap that a later contact has to reach: what is missing elsewhere in the model is no matter of it."""
 
 
 def fit_plant_and_onset(
@@ -32,7 +33,7 @@ def fit_plant_and_onset(
     -------
     fit : PlantFit
     taps : sequence of Features
-        As they were fitted: their captures say what was known of contact, mass, velocity and scales.
+        Their captures say what is known of contact, mass, velocity and scales.
 
     Raises
     ------
@@ -55,11 +56,11 @@ def fit_plant_and_onset(
     if other is not None and falls and other.gap < GAP_ENOUGH:
         return other, later
     # A gap of some per cent, as of noise that is stated a little low, makes nothing exact that was told.
-    if open_fit is not None and open_fit.gap < GAP_ENOUGH:
+    if open_fit is not None and open_fit.gap <= MISFIT_THRESHOLD:
         return open_fit, measured
     if fit is None:
         raise fault or NotConvergedError("the plant could not be fitted to the campaign")
-    return fit, exact
+    return fit, measured
 
 
 def _fitted(

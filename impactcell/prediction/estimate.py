@@ -5,7 +5,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from impactcell.errors import NotConvergedError, PredictionError
-from impactcell.features import Fault, Features, MeasuredFeature, SlideFeatures, extract, impulse_balance
+from impactcell.features import (
+    Fault,
+    Features,
+    MeasuredFeature,
+    SlideFeatures,
+    extract,
+    impulse_balance,
+    required,
+)
 from impactcell.prediction.equations import beyond_calibration, by_distance, by_force, combined, out_of_range
 from impactcell.prediction.linearised_model import FORCE_SCALE, MASS, PARAMETERS, POSITION_SCALE, VELOCITY
 from impactcell.prediction.mass_interpolation import interpolate_mass
@@ -54,7 +62,8 @@ def estimate_from_features(features: Features, model: Model, misfit: float = 1.0
     misfit : float
         RMS of the model's residuals over many taps, 1 = noise, where it is known. A model that misses those
         bends mu_s even in a tap that it seems to fit: then mu_s comes from the equations, whose few
-        coefficients bend less, and mu_k from the deceleration of the slide.
+        coefficients bend less, and mu_k from the deceleration of the slide. Mass, velocity and scales count
+        as told then, for they would follow what the model lacks.
     """
     capture = features.capture
     peak, force_fault = _peak_force(features)
@@ -66,13 +75,13 @@ def estimate_from_features(features: Features, model: Model, misfit: float = 1.0
         mu_k = _mu_k(model, slide, mu_s, capture)
     else:
         try:
-            waveform = fit(features, model)
+            waveform = fit(features if misfit <= MISFIT_THRESHOLD else _exactly_told(features), model)
         except PredictionError as fault:
             mu_k = _mu_k(model, slide, mu_s, capture)
             mu_s = _with_warnings(mu_s, f"no waveform estimate: {fault}")
             gap = fault.gap if isinstance(fault, NotConvergedError) else math.nan
         else:
-            mu_s_seen, mu_k, gap = _from_waveform(model, capture, waveform)
+            mu_s_seen, mu_k, gap = _from_waveform(model, features, waveform)
             if max(misfit, waveform.misfit) > MISFIT_THRESHOLD:
                 mu_k = _with_warnings(_mu_k(model, slide, mu_s_seen, capture), mu_k.reason)
             if misfit <= MISFIT_THRESHOLD or mu_s.quality is Quality.BAD:
@@ -128,10 +137,22 @@ def _by_equations(
     return _Equations(mu_force, mu_distance, _with_warnings(mu_combined, warning, "; ".join(faults)))
 
 
+def _exactly_told(features: Features) -> Features:
+    """Take mass, velocity and scales of a tap as they were told."""
+    told = replace(
+        features.capture, mass_std=0.0, velocity_std=0.0, force_scale_std=0.0, position_scale_std=0.0
+    )
+    return replace(features, capture=told)
+
+
 def _from_waveform(
-    model: Model, capture: Capture, waveform: WaveformFit
+    model: Model, features: Features, waveform: WaveformFit
 ) -> tuple[Coefficient, Coefficient, float]:
     """Coefficients as published, with a warning for a tap outside the calibration or unlike the model."""
+    capture, mu_k_std = features.capture, waveform.mu_k_std
+    if _halts_in_contact(features):
+        # The place of the halt tells the position's scale no better than anybody knows the stroke.
+        mu_k_std = max(mu_k_std, capture.position_scale_std * waveform.mu_k)
     warnings = [beyond_calibration(model, capture, waveform.mu_s), *_told_otherwise(capture, waveform)]
     warnings.append(waveform.record_fault)
     if waveform.misfit > MISFIT_THRESHOLD:
@@ -141,8 +162,15 @@ def _from_waveform(
     at_once = waveform.immediate > 0.5
     reason = "mu_s through mu_k/mu_s of the model: the part moved at once" if at_once else ""
     mu_s = Coefficient(waveform.mu_s, waveform.mu_s_std, Quality.GOOD, reason, waveform.mu_s_common_std)
-    mu_k = Coefficient(waveform.mu_k, waveform.mu_k_std, Quality.GOOD, "", waveform.mu_k_common_std)
+    own_variance = waveform.mu_k_std**2 - waveform.mu_k_common_std**2
+    mu_k = Coefficient(waveform.mu_k, mu_k_std, Quality.GOOD, "", math.sqrt(mu_k_std**2 - own_variance))
     return _with_warnings(mu_s, *warnings), _with_warnings(mu_k, *warnings), waveform.gap
+
+
+def _halts_in_contact(features: Features) -> bool:
+    """Whether the actuator is at the end of its stroke before contact is lost."""
+    capture = features.capture
+    return required(features.separation).value * capture.velocity_m_s > capture.stroke_m
 
 
 def _told_otherwise(capture: Capture, waveform: WaveformFit) -> list[str]:

@@ -11,7 +11,7 @@ from impactcell.api.first_model import fit_first_model
 from impactcell.campaign.recorded_campaign import from_captures
 from impactcell.features import extract
 from impactcell.prediction.contact_onset import GAP_ENOUGH, fit_plant_and_onset, is_late, onset_sentence
-from impactcell.records import Capture, Channel
+from impactcell.records import POSITION_SCALE_STD, Capture, Channel, Quality
 from tests.taps import Tap
 
 
@@ -61,22 +61,29 @@ def test_contact_stays_where_it_is_said_to_be_if_that_is_not_what_is_wrong(
     assert [tap.capture.onset_std_s for tap in used] == pytest.approx([5e-6] * len(used))
 
 
-def test_noise_that_is_stated_a_little_low_makes_nothing_exact_that_was_told() -> None:
-    """Masses, velocities and scales count as known to some tenths of a per cent, and mu_k with them."""
+@pytest.mark.parametrize("low", [0.96, 0.9])
+def test_noise_that_is_stated_a_little_low_makes_nothing_exact_that_was_told(low: float) -> None:
+    """Masses, velocities and scales count as known to some tenths of a per cent, and mu_k with them.
+
+    With noise stated a tenth too low and masses 0.1 % off all mu_s were Good and up to 7 of their standard
+    deviations off.
+    """
     taps, _ = triggered(0.0)
 
     def stated_low(channel: Channel | None) -> Channel:
         assert channel is not None
         assert channel.noise_std is not None
-        return replace(channel, noise_std=0.96 * channel.noise_std)
+        return replace(channel, noise_std=low * channel.noise_std)
 
-    low = [replace(tap, force=stated_low(tap.force), position=stated_low(tap.position)) for tap in taps]
+    stated = [replace(tap, force=stated_low(tap.force), position=stated_low(tap.position)) for tap in taps]
     right, as_told = fit_plant_and_onset([extract(tap) for tap in taps], 9.81)
-    fit, used = fit_plant_and_onset([extract(tap) for tap in low], 9.81)
+    fit, used = fit_plant_and_onset([extract(tap) for tap in stated], 9.81)
     assert right.gap < 1.01 < 1.03 < fit.gap
     for tap, same in zip(used, as_told, strict=True):
-        expected = right.estimate(same, right.model).mu_k.std
-        assert fit.estimate(tap, fit.model).mu_k.std == pytest.approx(expected, rel=0.1)
+        expected = right.estimate(same, right.model)
+        found = fit.estimate(tap, fit.model)
+        assert 0.9 < found.mu_k.std / expected.mu_k.std < 1.3
+        assert found.mu_s.std > 0.9 * expected.mu_s.std
 
 
 def test_no_trigger_is_called_late_where_that_does_not_explain_the_taps() -> None:
@@ -85,6 +92,10 @@ def test_no_trigger_is_called_late_where_that_does_not_explain_the_taps() -> Non
     fit, used = fit_plant_and_onset([extract(tap) for tap in triggered(0.0, damped)[0]], 9.81)
     assert fit.gap > GAP_ENOUGH
     assert not is_late(fit, used)
+    for tap in used:  # seen by the position, whose scale is known only so well, whatever the model misses
+        mu_k = fit.estimate(tap, fit.model).mu_k
+        assert mu_k.quality is Quality.UNCERTAIN
+        assert mu_k.std >= POSITION_SCALE_STD * mu_k.value
     assert onset_sentence(1e-4).startswith("first contact lies 100 µs after")
 
 
