@@ -43,6 +43,7 @@ class CellValues:
     def __init__(self, cell: CellSpace, values: VariableStore, space: object, now: datetime) -> None:
         self._variables: dict[str, tuple[StoredVariable, ua.VariantType, bool]] = {}
         self._seen: set[str] = set()
+        self._given: set[str] = set()
         for path in (*(q.path for q in CYCLE), *(q.path for q in MODULE)):
             node = cell.path(path)
             kind = ua.VariantType(read_attribute(space, node, ua.AttributeIds.DataType).Identifier)
@@ -75,24 +76,28 @@ class CellValues:
 
     def lost(self, time_ns: int) -> None:
         """No communication: every figure of a cycle becomes Bad and keeps its last value."""
-        self._restate(NO_COMMUNICATION, time_ns)
+        self._restate(time_ns, given=NO_COMMUNICATION, missing=NO_COMMUNICATION)
 
     def stale(self, time_ns: int) -> None:
-        """Nothing new for a while: every figure of a cycle becomes Uncertain and keeps its last value."""
-        self._restate(LAST_USABLE, time_ns)
+        """Nothing new for a while: every figure of the last cycle becomes Uncertain and keeps its value.
 
-    def _restate(self, status: ua.StatusCode, time_ns: int) -> None:
+        One that the last cycle did not give stays Bad: time makes no figure of an earlier cycle its own.
+        """
+        self._restate(time_ns, given=LAST_USABLE, missing=BAD)
+
+    def _restate(self, time_ns: int, *, given: ua.StatusCode, missing: ua.StatusCode) -> None:
         time = moment(time_ns)
-        for quantity in CYCLE:
-            if quantity.path in self._seen:
-                self._variables[quantity.path][0].set_status(status, time)
+        for path in self._seen:
+            self._variables[path][0].set_status(given if path in self._given else missing, time)
 
     def _write(self, path: str, value: Value, quality: Quality, time: datetime, now: datetime) -> None:
         variable, kind, is_array = self._variables[path]
         if quality is Quality.BAD or (isinstance(value, float) and math.isnan(value)):
             # A Bad value is the last one that could be believed; there is none before the first.
+            self._given.discard(path)
             status = BAD if path in self._seen else WAITING
             variable.write(ua.DataValue(variable.data.Value, status, time, now))
             return
         self._seen.add(path)
+        self._given.add(path)
         variable.write(ua.DataValue(ua.Variant(value, kind, None, is_array), STATUS[quality], time, now))

@@ -203,6 +203,28 @@ async def test_status_value_and_time() -> None:
         assert (await _read(here, client, "Friction/StaticFriction")).StatusCode.is_good()
 
 
+async def test_waiting_makes_no_figure_usable_that_the_last_cycle_did_not_give() -> None:
+    """OPC UA Part 8, 6.3.3: the last usable value is of what was usable when its source fell silent."""
+    async with site() as here, await here.client() as client:
+        here.publish(0.2)
+        here.publish(math.nan, quality=Quality.BAD)
+        for mark, given, missing in (
+            (here.server.mark_stale, codes.UncertainNoCommunicationLastUsableValue, codes.Bad),
+            (here.server.mark_bad, codes.BadNoCommunication, codes.BadNoCommunication),
+            (here.server.mark_stale, codes.UncertainNoCommunicationLastUsableValue, codes.Bad),
+        ):
+            mark(CELL, time.time_ns())
+            friction = await _read(here, client, "Friction/StaticFriction")
+            assert (friction.StatusCode.value, friction.Value.Value) == (missing, 0.2)
+            number = await _read(here, client, "Friction/CycleNumber")
+            assert number.StatusCode.value == given
+        here.publish(0.22)
+        here.server.mark_stale(CELL, time.time_ns())
+        friction = await _read(here, client, "Friction/StaticFriction")
+        assert friction.StatusCode.value == codes.UncertainNoCommunicationLastUsableValue
+        assert friction.Value.Value == 0.22
+
+
 async def test_only_changes_are_told() -> None:
     async with site() as here, await here.client() as client:
         here.publish(0.2)
