@@ -176,7 +176,7 @@ CYCLE: Final[tuple[Quantity[Snapshot], ...]] = (
        lambda r: (0.0, r.sliding_distance_m), is_array=True),
     _Q("Signature/Friction", 6061,
        "Kinetic friction at each Position; NaN where the part did not get that far.",
-       ("Friction along the stroke", "Reibung entlang des Wegs"),
+       ("Friction along the slide", "Reibung entlang des Gleitwegs"),
        lambda s: s.signature.friction, _signature_quality, ONE, _friction_range, is_array=True),
     _Q("Signature/TSquared", 6064, "Hotelling's T squared of the leading components.",
        ("Distance from the learned cycles (T²)", "Abstand von den gelernten Zyklen (T²)"),

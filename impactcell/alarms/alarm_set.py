@@ -225,6 +225,15 @@ def apply_event(state: AlarmSetState, name: str, event: AlarmEvent) -> tuple[Ala
     return replace(state, alarms=_with(state.alarms, index, change.alarm)), change
 
 
+def end_surface(state: AlarmSetState, cycle: int, time_ns: int) -> AlarmSetState:
+    """End what was told of a surface that has been renewed; a new one that is worn too calls anew."""
+    for name, rule in RULES.items():
+        if rule.ends_with_surface:
+            state, _ = apply_event(state, name, AlarmEvent(EventKind.CLEAR, cycle, time_ns))
+            state = replace(state, counters=_with(state.counters, _INDEX[name], ZERO_COUNTS))
+    return state
+
+
 def expire_shelving(
     state: AlarmSetState, cycle: int, time_ns: int
 ) -> tuple[AlarmSetState, tuple[Transition, ...]]:

@@ -127,6 +127,8 @@ class CycleInputs:
         Of the tracker: mu_s minus what was predicted, in standard deviations; nan where it was not used.
     deviation : Evidence or None
         Of the signature, where the cycle deviates; `judged` says whether that could be told.
+    pushed_m : float
+        Way of the part from where it lay until contact was last lost, m; nan where it is not known.
     gap : Evidence
         Of the model's residual; `gap_exceeds` None while the usual one is being learned.
     predictions : TapPredictions or None
@@ -146,6 +148,7 @@ class CycleInputs:
     innovation: float = math.nan
     deviation: Evidence | None = None
     judged: bool = False
+    pushed_m: float = math.nan
     gap: Evidence = NO_EVIDENCE
     gap_exceeds: bool | None = None
     predictions: TapPredictions | None = None
@@ -209,6 +212,8 @@ class AlarmRule:
         Of a rule that looks at every cycle; None for one of what happens beside the cycles.
     suppressed_by_announcement : bool
         An announced batch change keeps it silent for a while.
+    ends_with_surface : bool
+        It is of the surface that wears: once that has been renewed, what was told is over.
     explained_by : tuple of str
         Rules by name: while one of them holds or is active, it has called already, and this one does not.
         Here and in the next two, one whose condition is disabled calls nobody and explains nothing.
@@ -238,6 +243,7 @@ class AlarmRule:
     input_node: str = ""
     evaluate: Evaluate | None = None
     suppressed_by_announcement: bool = False
+    ends_with_surface: bool = False
     explained_by: tuple[str, ...] = ()
     explained_at_once_by: tuple[str, ...] = ()
     may_be_explained_by: tuple[str, ...] = ()

@@ -32,7 +32,7 @@ from impactcell.cell.preprocessing import (
     fill_defaults,
     update_period,
 )
-from impactcell.features import extract
+from impactcell.features import Fault, extract
 from impactcell.physics import free_motion
 from impactcell.prediction import Model, estimate_from_features
 from impactcell.records import (
@@ -149,8 +149,7 @@ def migrate_state(design: CellDesign, state: CellState) -> CellState:
     digest = model_digest(design.model)
     if state.model_digest == digest:
         return state
-    has_changed = bool(state.model_digest)
-    model = design.model
+    has_changed, model = bool(state.model_digest), design.model
     if has_changed and (model.is_provisional or model.provenance.get(REPLACED) == state.model_digest):
         state = replace(state, tracker=TrackerState(clock=state.tracker.clock))
     gap = gap_cusum.GapState() if has_changed else state.gap
@@ -200,6 +199,7 @@ def step(
         innovation=tracked.innovation,
         deviation=signed.deviation,
         judged=signed.judged,
+        pushed_m=math.nan if isinstance(features.slide, Fault) else features.slide.pushed_m,
         gap=gapped.evidence,
         gap_exceeds=gapped.exceeds,
         predictions=positioning.predictions,
@@ -272,13 +272,14 @@ def start_batch(state: CellState, batch_id: str, *, expected: bool) -> CellState
     return replace(state, batch=replace(state.batch, by_operator=named))
 
 
-def reset_wear_level(state: CellState) -> CellState:
-    """Learn wear level and usual friction along the stroke anew, after worn parts were replaced.
+def reset_wear_level(state: CellState, time_ns: int) -> CellState:
+    """Learn wear level and usual friction along the slide anew, after worn parts were replaced.
 
-    How cycles vary about what is usual is kept.
+    Alarms of wear end at `time_ns`. How cycles vary about what is usual is kept.
     """
-    tracker = wear_batch.reset_wear_level(state.tracker)
-    return replace(state, tracker=tracker, signature=signature.restart(state.signature))
+    tracker, usual = wear_batch.reset_wear_level(state.tracker), signature.restart(state.signature)
+    alarm_state = alarms.end_surface(state.alarms, state.cycle, time_ns)
+    return replace(state, tracker=tracker, signature=usual, alarms=alarm_state)
 
 
 def _of_session(state: CellState, capture: Capture) -> BatchNaming:

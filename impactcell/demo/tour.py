@@ -25,9 +25,9 @@ UNKNOWN_BATCH = Message(
     "Alarme: „Chargenwechsel“ kommt von selbst, mit seinem Nachweis. Quittieren Sie ihn, mit Kommentar.",
 )
 DEVIATION = Message(
-    "Friction along the stroke: the dashed curve and the place where it deviates; alarm “Deviant cycle”.",
-    "Reibung entlang des Hubs: die gestrichelte Kurve und die Stelle, wo sie abweicht; Alarm „Abweichender "
-    "Zyklus“.",
+    "Friction along the slide: the dashed curve and the place where it deviates; alarm “Deviant cycle”.",
+    "Reibung entlang des Gleitwegs: die gestrichelte Kurve und die Stelle, wo sie abweicht; Alarm "
+    "„Abweichender Zyklus“.",
 )
 APPEARANCE = Message(
     "Model and gap: the gap rises above 1 and the alarm “Model gap” comes. Then the workflow names the "
@@ -75,8 +75,8 @@ def tour(content: Mapping[str, Any]) -> tuple[TourStop, ...]:
     for deviation in content.get("deviations", []):
         kind = deviation["kind"]
         what = Message(
-            f"One cycle is odd: a {kind} along its stroke.",
-            f"Ein Zyklus ist anders: {KINDS[kind]} entlang seines Hubs.",
+            f"One cycle is odd: a {kind} along its way.",
+            f"Ein Zyklus ist anders: {KINDS[kind]} entlang seines Wegs.",
         )
         stops.append(TourStop(deviation["cycle"], what, DEVIATION))
     for entry in content.get("appearances", []):

@@ -49,6 +49,8 @@ class SlideFeatures:
     bend : float
         How far the deceleration at either end of the slide is from its mean, m/s²: 0 but for noise where
         friction is the same all along.
+    pushed_m : float
+        How far the part had come along the tap when contact was last lost, m.
     """
 
     distance: MeasuredFeature
@@ -56,6 +58,7 @@ class SlideFeatures:
     stop_s: float
     deceleration: MeasuredFeature
     bend: float
+    pushed_m: float
 
 
 def extract_slide(path: CheckedChannel, separation: MeasuredFeature) -> SlideFeatures:
@@ -82,7 +85,7 @@ def extract_slide(path: CheckedChannel, separation: MeasuredFeature) -> SlideFea
     speed = max(deceleration.value, 0.0) * (stop_s - separation_s)
     error = math.hypot(rest.std, start.std, speed * separation.std)
     distance = MeasuredFeature(rest.value - start.value, error)
-    return SlideFeatures(distance, separation_s, stop_s, deceleration, bend)
+    return SlideFeatures(distance, separation_s, stop_s, deceleration, bend, start.value)
 
 
 def _rest_and_deceleration(

@@ -142,7 +142,7 @@ class Signature:
         Hotelling's T² on the leading components, and the noise-whitened squared prediction error;
         nan while the reference is being learned.
     deviates_at_m : float
-        Where along the stroke the deviation is largest; nan without a deviation.
+        Distance slid where the deviation is largest; nan without a deviation.
     t_squared_limit, spe_limit : float
         From where on each of them makes a cycle deviant whatever the others say; a shape that is looked for
         can do so below both.

@@ -42,8 +42,9 @@ class OperatorCommands:
 
     async def reset_wear(self, cell: str, comment: str, actor: Actor) -> None:
         """Learn the wear level anew after worn parts were replaced."""
+        audit = _audit(actor, "ResetWear", Comment=comment)
         await self.running(cell).worker.change_state(
-            core.reset_wear_level, _audit(actor, "ResetWear", Comment=comment)
+            lambda state: core.reset_wear_level(state, audit.time_ns), audit
         )
 
     async def set_target(self, cell: str, target_m: float, actor: Actor) -> None:

@@ -170,7 +170,7 @@ class CellWorker:
 
     async def change_state(self, change_state: Callable[[CellState], CellState], audit: AuditEntry) -> None:
         """Change the state by a person's command, and write down who did it."""
-        await self.run(lambda: self._record(change_state(self._state), (), audit))
+        await self.run(lambda: self._record(change_state(self._state), audit))
 
     async def retry(self) -> None:
         """Try again to write what the journal could not take, also while no cycles come."""
@@ -179,7 +179,7 @@ class CellWorker:
 
     async def record(self, audit: AuditEntry | None = None) -> None:
         """Store the state now, with what a person did that is not in it."""
-        await self.run(lambda: self._record(self._state, (), audit))
+        await self.run(lambda: self._record(self._state, audit))
 
     async def redesign(self, design: CellDesign) -> None:
         """Go on with other settings or another model, from the next cycle on."""
@@ -276,23 +276,25 @@ class CellWorker:
     def _apply_rule_result(self, rule_result: RuleResult, time_ns: int) -> None:
         state, changed = core.apply_rule_result(self._design, self._state, rule_result, time_ns)
         if changed:
-            self._record(state, changed, None)
+            self._record(state)
         else:
             self._state = state
 
     def _expire_shelving(self, time_ns: int) -> None:
         state, changed = core.expire_shelving(self._state, time_ns)
         if changed:
-            self._record(state, changed, None)
+            self._record(state)
 
     def _apply_event(self, name: str, event: AlarmEvent, audit: AuditEntry) -> Transition:
         state, transition = core.apply_event(self._state, name, event)
         audit = replace(audit, result="Good" if transition.refusal is None else transition.refusal.value)
-        self._record(state, (transition.alarm,) if transition.notifications else (), audit)
+        self._record(state, audit)
         return transition
 
-    def _record(self, state: CellState, changed: tuple[Alarm, ...], audit: AuditEntry | None) -> None:
+    def _record(self, state: CellState, audit: AuditEntry | None = None) -> None:
         """Take a state and store it; one that cannot be written is not taken, for no later one could be."""
+        pairs = zip(self.alarms, state.alarms.alarms, strict=True)
+        changed = tuple(after for before, after in pairs if after is not before)
         blob = self._blob(state, self._snapshot, self.last)
         self._state = state
         self._journal_writer.store(lambda journal: journal.record(blob, changed, audit))

@@ -127,15 +127,15 @@ NAMED_FAULTS: Final = (
     NamedFault(
         "acknowledgements not in the journal's audit",
         "impactcell/service/worker.py",
-        "self._record(state, (transition.alarm,) if transition.notifications else (), audit)",
-        "self._record(state, (transition.alarm,) if transition.notifications else (), None)",
+        "self._record(state, audit)",
+        "self._record(state)",
         ("tests/unit/service",),
     ),
     NamedFault(
         "commands not in the journal's audit",
         "impactcell/service/worker.py",
-        "self._record(change_state(self._state), (), audit)",
-        "self._record(change_state(self._state), (), None)",
+        "self._record(change_state(self._state), audit)",
+        "self._record(change_state(self._state))",
         ("tests/unit/service",),
     ),
     NamedFault(

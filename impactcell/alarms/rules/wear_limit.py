@@ -126,6 +126,7 @@ RULE = AlarmRule(
     condition_class=ConditionClass.MAINTENANCE,
     input_node="Wear/Level",
     evaluate=evaluate,
+    ends_with_surface=True,
     is_probability=True,
 )
 """The rule."""

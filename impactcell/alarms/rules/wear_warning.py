@@ -78,6 +78,7 @@ RULE = AlarmRule(
     condition_class=ConditionClass.MAINTENANCE,
     input_node="Wear/CyclesToLimit",
     evaluate=evaluate,
+    ends_with_surface=True,
     explained_by=(wear_limit.NAME,),
     is_probability=True,
 )

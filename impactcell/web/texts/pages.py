@@ -94,15 +94,15 @@ PAGE_TEXTS: Texts = {
     "span_hour": ("Hour", "Stunde"),
     "span_shift": ("Shift (8 h)", "Schicht (8 h)"),
     "span_month": ("Month", "Monat"),
-    "signature": ("Friction along the stroke", "Reibung entlang des Wegs"),
+    "signature": ("Friction along the slide", "Reibung entlang des Gleitwegs"),
     "signature_help": (
         "Line: last cycle with ± beside it; band: cycles before; dashed: the last deviant cycle.",
         "Linie: letzter Zyklus mit ± daneben; Band: davor; gestrichelt: letzter abweichender.",
     ),
     "reset_wear": ("Worn parts were replaced", "Verschlissene Teile wurden ersetzt"),
     "reset_wear_help": (
-        "The wear level is learned anew. Who did it, and the comment, are kept in the audit trail.",
-        "Das Verschleißniveau wird neu gelernt. Wer es war und der Kommentar werden festgehalten.",
+        "The wear level is learned anew; its alarms end. The audit trail keeps who did it, and the comment.",
+        "Das Verschleißniveau wird neu gelernt; seine Alarme enden. Wer und Kommentar werden festgehalten.",
     ),
     "reset_wear_done": (
         "The wear level is learned anew, from the next cycle on.",

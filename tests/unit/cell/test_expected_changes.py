@@ -82,7 +82,7 @@ def test_a_change_that_a_person_said_or_another_model_is_calls_nobody(design, le
 
 def test_a_surface_that_was_renewed_is_no_deviant_cycle(design, learned):
     """The first tap after a reset of wear was one, and its alarm stood for twenty cycles."""
-    fresh = core.reset_wear_level(learned)
+    fresh = core.reset_wear_level(learned, AT)
     before, after = learned.signature.reference, fresh.signature.reference
     assert (before.weight > 0.0, after.weight) == (True, 0.0)
     assert after.variation is before.variation

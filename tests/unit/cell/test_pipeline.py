@@ -1,5 +1,6 @@
 """One cycle of a cell as a whole: what its parts are told of each other."""
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -46,6 +47,31 @@ def test_an_effect_that_the_model_knows_makes_no_cycle_deviant(seed: int) -> Non
     plant = replace(design.model.plant, effects=VISCOUS | STRIBECK)
     design = replace(design, model=replace(design.model, plant=plant))
     assert deviant_cycles(design, seed, 90) == []
+
+
+def test_a_deviant_cycle_says_where_from_the_end_of_contact_and_from_where_the_part_lay() -> None:
+    """A bump lies on the table, 2 mm from the part, in the slide of cycle 71."""
+    design = cell_design(read_cell(CONFIG / "cells" / "new-effect.yaml"))
+    state, draw = core.initial_state(design), np.random.default_rng(5)
+    bump = {"friction_patch": {"amplitude": 0.5, "position_m": -0.002, "width_m": 0.0005}}
+    for cycle in range(1, 78):
+        effects = VISCOUS | (bump if cycle == 71 else {})
+        mu_s = 0.2 * (1.0 + 0.006 * draw.standard_normal())
+        tap = Tap(4000 / 6e4, mu_s, stroke_m=1.5e-3, direction=-1, effects=effects)
+        stepped = core.step(design, state, tap.capture(draw, cycle=cycle), PositioningState())
+        state = stepped.state
+    alarm = state.alarms.alarm("DeviantCycle")
+    assert alarm.active
+    pushed_mm = 1e3 * abs(float(tap.motion().position_m(np.array([tap.motion().separation_s]))[0]))
+    for message, words in (
+        (alarm.message, r"(.*) mm after contact ended \((.*) mm from where the part lay\)"),
+        (alarm.message_de, r"(.*) mm nach Ende des Kontakts \((.*) mm von dort. wo das Teil lag\)"),
+    ):
+        found = re.search(r": " + words, message.replace(",", "."))
+        assert found is not None, message
+        slid_mm, way_mm = map(float, found.groups())
+        assert way_mm == pytest.approx(2.0, abs=0.2)
+        assert way_mm - slid_mm == pytest.approx(pushed_mm, abs=0.02)
 
 
 @pytest.mark.long

@@ -153,13 +153,41 @@ def test_a_module_that_restarts_is_followed_from_its_first_cycle_on(
 
 
 def test_a_reset_of_wear_begins_at_the_next_cycle(design: CellDesign, learned: CellState) -> None:
-    fresh = core.reset_wear_level(learned)
+    fresh = core.reset_wear_level(learned, SECOND)
     assert len(fresh.tracker.bank) == 0
     assert (fresh.cycle, fresh.period_s) == (learned.cycle, learned.period_s)
-    assert fresh.alarms is learned.alarms
+    assert fresh.alarms == learned.alarms
     assert fresh.tracker.noise is learned.tracker.noise
     done = core.step(design, fresh, capture(LEARNED + 1, 0.15), PositioningState())
     assert done.snapshot.wear.level == pytest.approx(done.snapshot.friction.mu_s.value)
+
+
+def test_a_reset_of_wear_ends_what_was_told_of_the_surface_before(design: CellDesign) -> None:
+    """The surface was not renewed after all, and told since when the one before it had been worn."""
+    worn = replace(design, tracker=replace(design.tracker, wear_limit=0.15))
+    state = core.initial_state(worn)
+
+    def follow(first: int, cycles: int) -> None:
+        nonlocal state
+        for cycle in range(first, first + cycles):
+            state = core.step(worn, state, capture(cycle), PositioningState()).state
+
+    follow(1, LEARNED)
+    before = state.alarms.alarm("WearLimit")
+    assert before.active
+    assert before.evidence.change_cycle <= LEARNED
+    state = core.reset_wear_level(state, 99 * SECOND)
+    ended = state.alarms.alarm("WearLimit")
+    assert (ended.active, ended.acknowledged, ended.cycle, ended.time_ns) == (
+        False, False, LEARNED, 99 * SECOND,
+    )  # fmt: skip
+    follow(LEARNED + 1, 1)
+    assert not state.alarms.alarm("WearLimit").active, "delays count anew"
+    follow(LEARNED + 2, LEARNED)
+    again = state.alarms.alarm("WearLimit")
+    assert again.active
+    assert again.activation > before.activation
+    assert again.evidence.change_cycle > LEARNED
 
 
 def test_what_happens_beside_the_cycles_carries_the_cycle_and_its_own_time(

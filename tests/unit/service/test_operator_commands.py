@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from impactcell.alarms import EventKind, RuleResult
+from impactcell.journal.history import HistoryQuery
 from impactcell.journal.store import Journal
 from impactcell.scada import Actor, RefusedError, Role
 from impactcell.service.cell_task import CellTask
@@ -51,6 +52,17 @@ async def test_commands(task: CellTask, tmp_path: Path) -> None:
         (who, "SetTarget", {"Target": 0.0}, refused),
         (who, "AbortPositioning", {}, refused),
     ]
+
+
+async def test_what_a_reset_of_wear_ends_is_in_the_journal(task: CellTask, tmp_path: Path) -> None:
+    commands, cell = OperatorCommands({task.cell.name: task}), task.cell.name
+    for _ in range(6):  # its delay is of five cycles
+        await task.worker.apply_rule_result(RuleResult("WearLimit", holds=True), 1)
+    await commands.reset_wear(cell, "new plate", ANNA)
+    with Journal(tmp_path / "j", None, read_only=True) as journal:
+        stored = [(alarm.name, alarm.active) for alarm in journal.alarms(HistoryQuery()).entries]
+    assert stored == [("WearLimit", True), ("WearLimit", False)]
+    assert trail(tmp_path)[-1][1:] == ("ResetWear", {"Comment": "new plate"}, "Good")
 
 
 async def test_actions_on_alarms(task: CellTask, tmp_path: Path) -> None:
