@@ -49,6 +49,7 @@ GERMAN: Final = {
     "presliding length": "Vorgleitlänge",
     "ramp time": "Anlaufzeit",
     "range": "Reichweite",
+    "reference": "Bezugswert",
     "relative amplitude": "relative Amplitude",
     "relative change": "relative Änderung",
     "relative error": "relativer Fehler",

@@ -44,6 +44,7 @@ from impactcell.discrepancy.report import (
     machine_result,
     machine_sentences,
 )
+from impactcell.discrepancy.report.machine_parameters import parameter_rows
 from impactcell.errors import CampaignError, SettingsError
 from impactcell.german.findings import german_effect, german_headline, with_decimal_commas
 from impactcell.records import Capture, Channel
@@ -259,6 +260,38 @@ def test_a_law_that_is_a_term_is_called_by_its_name(
     document = machine_result.machine_document(finding)
     assert document["law"]["term"] == law.listed
     assert f"{german_effect(law.listed)} passt dazu, ist aber nicht benannt" in german_headline(document)
+
+
+def test_a_law_of_powers_can_be_computed_from_what_is_told_of_it() -> None:
+    """It was u^2 with an amplitude in N: what u is measured in stood in the law's own file alone."""
+    finding = with_law_of("friction_over_speed", "u^2", 3.0)
+    law = machine_result.machine_document(finding)["law"]
+    assert law["equation"] == "-s(|q'|) sign(q') with s(u) = (u/0.2 m/s)^2, u the speed"
+    amplitude, reference = law["parameters"]["amplitude_n"], law["parameters"]["reference"]
+    assert (amplitude["unit"], reference["unit"]) == ("N", "m/s")
+    assert amplitude["value"] * (0.1 / reference["value"]) ** 2 == pytest.approx(3.0 / 4.0)
+    assert "s(u) = (u/0.2 m/s)^2, u the speed" in machine_sentences.headline(finding)
+    assert "s(u) = (u/0,2 m/s)^2, u = Geschwindigkeit" in german_machine_sentences.headline(finding)
+    rows = parameter_rows((("", law["parameters"]),), Coordinate.TRANSLATION, "de")
+    assert [(row["words"], row["unit"]) for row in rows] == [("Amplitude", "N"), ("Bezugswert", "m/s")]
+
+
+def test_shapes_of_a_law_have_units_and_no_reference_that_it_has_not() -> None:
+    finding = with_law_of("force_over_position", "1")
+    assert finding.law is not None
+    assert finding.law.choice is not None
+    [power, decay] = [atom for atom in ATOMS if atom.name in ("u^n", "1/(1+u/l)")]
+    for atom, shapes, told in (
+        (power, (1.5,), {"exponent": (1.5, "1"), "reference": (0.2, "m")}),
+        (decay, (0.03,), {"scale": (0.03, "m")}),
+    ):
+        form = LawForm((Shaped((atom,), (shapes,)),), 0.2)
+        choice = replace(finding.law.choice, law=form)
+        fit = replace(finding.law.model.fit, columns=ChosenTerm(choice, 0.0).columns)
+        law = replace(finding.law, choice=choice, model=replace(finding.law.model, fit=fit))
+        document = machine_result.machine_document(replace(finding, law=law))
+        _, *shown = document["law"]["parameters"].items()
+        assert {name: (item["value"], item["unit"]) for name, item in shown} == told
 
 
 def test_that_intervals_do_not_include_what_remains_is_german_too() -> None:

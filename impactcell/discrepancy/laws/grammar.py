@@ -79,6 +79,22 @@ class Atom:
         """Give the same function of the second covariate."""
         return replace(self, name=re.sub(r"\bu\b", "w", self.name), second=True)
 
+    @property
+    def has_reference(self) -> bool:
+        """Whether the covariate is measured in its reference."""
+        return "reference" in self.source
+
+    def over(self, reference: str) -> str:
+        """Give the name with the reference, written with its unit, where the covariate is measured in it.
+
+        >>> [atom.over("0.5 m/s") for atom in ATOMS if atom.name in ("u", "u^2", "max(u-c,0)", "tanh(u/l)")]
+        ['(u/0.5 m/s)', '(u/0.5 m/s)^2', 'tanh(u/l)', '(max(u-c,0)/0.5 m/s)']
+        """
+        if not self.has_reference:
+            return self.name
+        is_power = self.name[0] in "uw"
+        return f"({self.name[0]}/{reference}){self.name[1:]}" if is_power else f"({self.name}/{reference})"
+
     def values(self, u: Samples, reference: float, shapes: tuple[float, ...]) -> Samples:
         """Values at u, shape (n,)."""
         names = (shape.name for shape in self.shapes)

@@ -56,6 +56,16 @@ class LawForm:
         """The function as one would print it, without its numbers."""
         return form_name(tuple(item.term for item in self.terms))
 
+    @property
+    def has_reference(self) -> bool:
+        """Whether any of its atoms is over the reference."""
+        return any(atom.has_reference for item in self.terms for atom in item.term)
+
+    def printed(self, unit: str) -> str:
+        """Write the function with its reference, in the unit of the covariate, and terms in their order."""
+        reference = f"{self.reference:.3g} {unit}"
+        return " + ".join(" ".join(atom.over(reference) for atom in item.term) for item in self.terms)
+
 
 @dataclass(frozen=True, slots=True)
 class TermChoice:

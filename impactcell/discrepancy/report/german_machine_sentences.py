@@ -94,17 +94,17 @@ def headline(finding: MachineFinding) -> str:
             beside = as_title(enumerated([held_number(phrase) for phrase in law.beside], "und"))
             bring = "bringt" if len(law.beside) == 1 else "bringen"
             said += f" {beside} {bring} sie auf {law.fall.before:.2f}; daneben:"
+        says = equation(law_equation(finding, law))
         if law.listed:
             besides = "daneben " if finding.established else ""
             why = reason(why_not_named(finding, law.listed))[1]
             said += (
-                f" {equation(law_equation(law))}, {phrase(law.listed)}, brächte die Abweichung {besides}auf "
+                f" {says}, {phrase(law.listed)}, brächte die Abweichung {besides}auf "
                 f"{law.fall.after:.2f}; benannt ist es nicht, denn: {why}."
             )
         else:
             said += (
-                f" {equation(law_equation(law))}, bringt die Abweichung auf {law.fall.after:.2f}: "
-                "ein Gesetz, das keine Liste hatte."
+                f" {says}, bringt die Abweichung auf {law.fall.after:.2f}: ein Gesetz, das keine Liste hatte."
             )
     fit = finding.simulated[-1].fit_percent
     follows = german_open_loop_sentence(channel_name(finding.base.response), fit)

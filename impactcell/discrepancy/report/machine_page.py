@@ -11,8 +11,7 @@ import numpy as np
 from impactcell.discrepancy.machine import CATALOGUE, VALUES, ChosenTerm, MachineFinding, motions
 from impactcell.discrepancy.report import german_machine_sentences, machine_sentences
 from impactcell.discrepancy.report.law_figures import function_figure
-from impactcell.discrepancy.report.machine_parameters import SYMBOLS, parameter_rows
-from impactcell.discrepancy.report.machine_result import law_covariate
+from impactcell.discrepancy.report.machine_parameters import SYMBOLS, law_covariate, parameter_rows
 from impactcell.discrepancy.report.page import report_environment
 from impactcell.german.findings import REPORTS
 

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from impactcell.campaign import Coordinate
+from impactcell.discrepancy.machine import COVARIATES, LAW_PLACES, MachineFinding
 from impactcell.german.parameters import words_of
 
 SYMBOLS: Final = {
@@ -40,6 +41,14 @@ def parameter_name(name: str, unit: str, coordinate: Coordinate) -> str:
     return f"{name}_{slug}" if slug else name
 
 
+def law_covariate(finding: MachineFinding) -> tuple[str, str]:
+    """Name what a proposed law is a function of, and its unit."""
+    symbols = SYMBOLS[finding.base.coordinate]
+    covariate = "" if finding.law is None else COVARIATES[LAW_PLACES[finding.law.place]]
+    units = {"speed": f"{symbols['q']}/s", "load": symbols["force"], "position": symbols["q"]}
+    return covariate, units.get(covariate, "1")
+
+
 def machine_parameter_words(name: str, coordinate: Coordinate, language: str) -> tuple[str, str]:
     """Give words and unit of a parameter.
 
@@ -66,7 +75,7 @@ def machine_parameter_words(name: str, coordinate: Coordinate, language: str) ->
 def parameter_rows(
     owners: Iterable[tuple[str, Mapping[str, Any]]], coordinate: Coordinate, language: str
 ) -> list[dict[str, Any]]:
-    """Rows of a table of parameters: term, words, unit, and what `result.json` says of it.
+    """Rows of a table of parameters: term, name, words, unit, and what `result.json` says of it.
 
     Parameters
     ----------
@@ -78,5 +87,6 @@ def parameter_rows(
         for name, item in parameters.items():
             *of, own = name.rsplit(".", 1)
             words, unit = machine_parameter_words(own, coordinate, language)
-            rows.append({"term": of[0] if of else term, "words": words, "unit": unit, **item})
+            told = {"name": own, "words": words, "unit": unit} | item
+            rows.append({"term": of[0] if of else term} | told | {"unit": told["unit"].removesuffix("1")})
     return rows

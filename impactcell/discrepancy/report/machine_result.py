@@ -4,7 +4,6 @@ import math
 from typing import Any
 
 from impactcell.discrepancy.machine import (
-    COVARIATES,
     ECCENTRICITY,
     FREE_FORMS,
     LAW_PLACES,
@@ -16,7 +15,7 @@ from impactcell.discrepancy.machine import (
     shape_grid,
     term_of,
 )
-from impactcell.discrepancy.report.machine_parameters import SYMBOLS, parameter_name
+from impactcell.discrepancy.report.machine_parameters import SYMBOLS, law_covariate, parameter_name
 from impactcell.discrepancy.report.machine_sentences import headline, law_equation
 from impactcell.discrepancy.report.result import FORMAT, SPLINE_ONLY, experiments, round_digits
 from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
@@ -129,7 +128,7 @@ def _law(finding: MachineFinding) -> dict[str, Any]:
         "place": FREE_FORMS[LAW_PLACES[law.place]],
         "covariates": [covariate],
         "form": SPLINE_ONLY if law.choice is None or law.choice.law is None else law.choice.law.name,
-        "equation": law_equation(law),
+        "equation": law_equation(finding, law),
         "term": law.listed or None,
         "parameters": {} if chosen is None else _law_parameters(finding, chosen),
         "equivalents": list(law.equivalents),
@@ -147,29 +146,27 @@ def _law(finding: MachineFinding) -> dict[str, Any]:
     return {"law": document, "law_refused": None}
 
 
-def law_covariate(finding: MachineFinding) -> tuple[str, str]:
-    """Name what a proposed law is a function of, and its unit."""
-    symbols = SYMBOLS[finding.base.coordinate]
-    covariate = "" if finding.law is None else COVARIATES[LAW_PLACES[finding.law.place]]
-    units = {"speed": f"{symbols['q']}/s", "load": symbols["force"], "position": symbols["q"]}
-    return covariate, units.get(covariate, "1")
-
-
 def _law_parameters(finding: MachineFinding, chosen: ChosenTerm) -> dict[str, Any]:
-    """Amplitudes with their intervals, and the shapes that went with the spline."""
+    """Amplitudes with their intervals, the shapes that went with the spline, and what powers are over."""
     assert finding.law is not None  # noqa: S101 - asked for a law alone
     assert chosen.choice.law is not None  # noqa: S101
-    model = finding.law.model
+    model, law = finding.law.model, chosen.choice.law
+    force, (_, of_covariate) = SYMBOLS[finding.base.coordinate]["force"], law_covariate(finding)
     document: dict[str, Any] = {}
     for (name, unit), column in zip(term_of(chosen.choice).strengths, chosen.columns, strict=True):
         place = model.fit.columns.index(column)
-        document[parameter_name(name, unit, finding.base.coordinate)] = _estimate(model, place)
-    for number, item in enumerate(chosen.choice.law.terms, 1):
+        told = parameter_name(name, unit, finding.base.coordinate)
+        document[told] = _estimate(model, place) | {"unit": force}
+    for number, item in enumerate(law.terms, 1):
         for atom, values in zip(item.term, item.shapes, strict=True):
             for shape, value in zip(atom.shapes, values, strict=True):
                 name = shape.name if f"{shape.name}" not in document else f"{shape.name}_{number}"
-                document[name] = {"value": round_digits(value), "ci95": None, "at_bound": False}
-    return document
+                document[name] = _held(value, of_covariate if shape.has_unit else "1")
+    return document | ({"reference": _held(law.reference, of_covariate)} if law.has_reference else {})
+
+
+def _held(value: float, unit: str) -> dict[str, Any]:
+    return {"value": round_digits(value), "ci95": None, "at_bound": False, "unit": unit}
 
 
 def _phase(finding: MachineFinding) -> str:

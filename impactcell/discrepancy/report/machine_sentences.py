@@ -2,6 +2,7 @@
 
 from impactcell.campaign import COLUMNS
 from impactcell.discrepancy.machine import FREE_FORMS, LAW_PLACES, MachineFinding, MachineLaw, term_of
+from impactcell.discrepancy.report.machine_parameters import law_covariate
 from impactcell.discrepancy.report.sentences import equation, label, note, reason, setting, written
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import open_loop_sentence
@@ -28,24 +29,26 @@ def headline(finding: MachineFinding) -> str:
         if law.beside:
             take = "takes" if len(law.beside) == 1 else "take"
             said += f" Beside {enumerated(law.beside, 'and')}, which {take} it to {law.fall.before:.2f},"
+        says = law_equation(finding, law)
         if law.listed:
             beside = " beside it" if finding.established else ""
             said += (
-                f" {law_equation(law)}, {phrase(law.listed)}, would take the held-out gap{beside} to "
+                f" {says}, {phrase(law.listed)}, would take the held-out gap{beside} to "
                 f"{law.fall.after:.2f}; it is not named, since {why_not_named(finding, law.listed)}."
             )
         else:
-            said += (
-                f" {law_equation(law)}, takes the held-out gap to {law.fall.after:.2f}: "
-                "a law that nobody had listed."
-            )
+            said += f" {says}, takes the held-out gap to {law.fall.after:.2f}: a law that nobody had listed."
     fit = finding.simulated[-1].fit_percent
     return f"{said} {open_loop_sentence(finding.base.response, fit, 'records')}".rstrip()
 
 
-def law_equation(law: MachineLaw) -> str:
-    """Equation of a law, or where only a spline does as well that of its place."""
-    return FREE_FORMS[LAW_PLACES[law.place]] if law.choice is None else term_of(law.choice).equation
+def law_equation(finding: MachineFinding, law: MachineLaw) -> str:
+    """Equation of a law, with what its powers are over; of its place where only a spline does as well."""
+    place, choice = FREE_FORMS[LAW_PLACES[law.place]], law.choice
+    if choice is None or choice.law is None:
+        return place if choice is None else term_of(choice).equation
+    covariate, unit = law_covariate(finding)
+    return f"{place} with s(u) = {choice.law.printed(unit)}, u the {covariate}"
 
 
 def why_not_named(finding: MachineFinding, name: str) -> str:
