@@ -181,9 +181,7 @@ def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json:
         rows.append(own_taps.sentence)
     sharing = cells_sharing(cell_config)
     if sharing:
-        rows.append(
-            f"{cell_config.settings.model} is the model file of {', '.join(sharing)} too, or has been"
-        )
+        rows.append(f"{cell_config.settings.model} is the model file of {', '.join(sharing)} too")
     _tell(
         {
             "cell": cell_config.name,

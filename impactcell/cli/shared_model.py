@@ -14,20 +14,11 @@ from impactcell.settings import CellConfig
 
 CELL_KEYS: Final = (re.compile(r"^cell:", re.MULTILINE), re.compile(r"^model:", re.MULTILINE))
 """What a cell file has among its keys: register maps and models, which may be long, are not read."""
-CALIBRATED_FOR: Final = re.compile(r"impactcell \S+, cell (?P<cell>.+)")
-"""What a model says of the cell that it was last calibrated for."""
 
 
 def cells_sharing(config: CellConfig) -> tuple[str, ...]:
-    """Name the cells beside a cell that run with the same model file, and the one it was last calibrated for.
-
-    Cell files elsewhere are not known of.
-    """
-    beside = dict.fromkeys(_beside(config))
-    calibrated = CALIBRATED_FOR.fullmatch(config.model.provenance.get("calibrated by", ""))
-    if calibrated is not None and calibrated["cell"] != config.name:
-        beside.setdefault(calibrated["cell"])
-    return tuple(beside)
+    """Name the cells whose files lie beside that of a cell and name the same model file."""
+    return tuple(dict.fromkeys(_beside(config)))
 
 
 def note_sharing(config: CellConfig, model: Model, sharing: tuple[str, ...]) -> None:
@@ -35,8 +26,8 @@ def note_sharing(config: CellConfig, model: Model, sharing: tuple[str, ...]) -> 
     target = config.settings.model
     if sharing:
         print_note(
-            f"{target} is the model file of {', '.join(sharing)} too, or has been: where it still is, they "
-            f"run with {model.name} as well; to keep them apart, name another `model` in {config.path}"
+            f"{target} is the model file of {', '.join(sharing)} too: they run with {model.name} as well; to "
+            f"keep them apart, name another `model` in {config.path}"
         )
     sources = [source for effect in model.plant.effects if (source := source_of(effect)) is not None]
     for source in sources:

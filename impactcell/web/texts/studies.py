@@ -71,8 +71,8 @@ STUDY_TEXTS: Texts = {
         "Das Modell wird erst kalibriert. Die Zelle nimmt es ab dem nächsten Zyklus; Gelerntes bleibt.",
     ),
     "accept_shared": (
-        "Cells that run, or ran, with the same model file, and take this model too:",
-        "Zellen, die mit derselben Modelldatei laufen oder liefen und dieses Modell auch nehmen:",
+        "Cells that run with the same model file, and take this model too:",
+        "Zellen, die mit derselben Modelldatei laufen und dieses Modell auch nehmen:",
     ),
     "accept": ("Accept: put it into service", "Annehmen: in Betrieb nehmen"),
     "restore": ("Undo: put the model from before back", "Rückgängig: das vorige Modell wieder nehmen"),
