@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -93,6 +94,12 @@ def test_a_force_on_slides_of_unknown_mass_is_told_for_a_kilogram_and_no_cell_ru
         accept_model(CELL, tmp_path / "out" / "model.extended.yaml")
     for name, said in (("report.html", "for a part of 1 kg"), ("report.de.html", "Teil von 1 kg, und keine")):
         assert said in (tmp_path / "out" / name).read_text(encoding="utf-8")
+    assert result["per_kilogram"] == ["viscous_friction"]
+    english, german = ((tmp_path / "out" / name).read_text() for name in ("report.html", "report.de.html"))
+    assert "<b>Measure next</b>: the mass of the part, which no slide shows" in english
+    assert "<b>Als Nächstes messen</b>: die Masse des Teils, die kein Gleiten zeigt" in german
+    assert re.findall(r"shot \d+, [+−]", english)
+    assert re.findall(r"(?:shot|Stoß) \d+, 1 kg", english + german) == []
 
 
 def test_the_mass_of_slides_is_the_cells_where_they_state_none(

@@ -327,3 +327,14 @@ def test_settings_are_said_in_german(english: str, german: str) -> None:
 )  # fmt: skip
 def test_shapes_are_said_in_german(english: str, german: str) -> None:
     assert german_sentences.shape(english) == german
+
+
+def test_what_is_said_of_a_laws_source_is_german_and_works_keep_their_titles() -> None:
+    assert german_sentences.reference(LIBRARY["viscous_friction"].reference) == (
+        "Gleichung (2) der zugrunde liegenden Arbeit; Olsson et al., Friction models and friction "
+        "compensation, Eur. J. Control 4 (1998)"
+    )
+    author = r"[A-Z][\w-]+( und [A-Z][\w-]+)?, .*\(\d{4}\)"
+    for effect in LIBRARY.values():
+        said = german_sentences.reference(effect.reference)
+        assert said != effect.reference or re.match(author, said), effect.identifier

@@ -125,7 +125,7 @@ def trace_figure(result: DiscrepancyResult, said: ModuleType) -> str:
     order = np.argsort(misfit)
     chosen = [int(order[0]), int(order[len(order) // 2]), int(order[-1])]
     channels = [number for number in range(3) if (shots.channel == number).any()]
-    times = shots.times
+    times, is_weighed = shots.times, not result.prepared.lacks_mass
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.5, 2.4 * len(channels) * 1.15))
         grid = figure.add_gridspec(
@@ -170,7 +170,7 @@ def trace_figure(result: DiscrepancyResult, said: ModuleType) -> str:
                     upper.set_ylabel(f"{said.phrase(CHANNELS[channel])} [{UNITS[channel]}]")
                     lower.set_ylabel(said.label("residual\n[noise std]"))
                 if row == 0:
-                    upper.set_title(_setting(item, said), fontsize=9)
+                    upper.set_title(_setting(item, is_weighed, said), fontsize=9)
                     if column == 0:
                         upper.legend(frameon=False, fontsize=8)
                         if extended:
@@ -189,11 +189,11 @@ def _moving_average(values: np.ndarray, step: int) -> np.ndarray:
     return np.convolve(values, np.ones(step) / step, mode="same")
 
 
-def _setting(shot: Any, said: ModuleType) -> str:
+def _setting(shot: Any, is_weighed: bool, said: ModuleType) -> str:  # noqa: FBT001
     parts = [f"{said.label('shot')} {shot.number}"]
     if np.isfinite(shot.velocity_m_s):
         parts.append(f"{shot.velocity_m_s / MM_PER_MIN:.0f} mm/min")
-    if np.isfinite(shot.mass_kg):
+    if is_weighed and np.isfinite(shot.mass_kg):
         parts.append(said.written(f"{shot.mass_kg:.3g} kg"))
     parts.append("+" if shot.direction > 0 else "−")
     return ", ".join(parts)

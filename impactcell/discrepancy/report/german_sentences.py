@@ -9,6 +9,7 @@ from impactcell.discrepancy.report import sentences
 from impactcell.discrepancy.report.german_notes import note
 from impactcell.discrepancy.report.german_patterns import Patterns
 from impactcell.discrepancy.report.german_reasons import reason
+from impactcell.discrepancy.report.german_references import REFERENCES
 from impactcell.discrepancy.report.german_words import phrase
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.report.sentences import NOT_SET
@@ -22,7 +23,8 @@ from impactcell.physics.free_column_forms import printed
 
 __all__ = [
     "advice", "equation", "headline", "in_german", "label", "law_sentences", "next_step",
-    "noise_floor_sentence", "note", "phrase", "reason", "setting", "shape", "split_sentence", "written",
+    "noise_floor_sentence", "note", "phrase", "reason", "reference", "setting", "shape", "split_sentence",
+    "written",
 ]  # fmt: skip
 _LABELS: Final = {
     "all shots": "alle Stöße",
@@ -98,6 +100,15 @@ def setting(english: str) -> str:
     return f"Charge {name} noch einmal, nach den anderen"
 
 
+def reference(english: str) -> str:
+    """Say where the law of an effect comes from: what is said of it, not the title of a work.
+
+    >>> reference("Span error: ISO 376 (2011)")
+    'Skalenfehler: ISO 376 (2011)'
+    """
+    return in_german(english, REFERENCES)
+
+
 def shape(english: str) -> str:
     """Say what is left along a phase."""
     return in_german(english, _SHAPES)
@@ -160,6 +171,10 @@ def next_step(result: DiscrepancyResult) -> str:
     if conclusion.verdict == UNTESTED:
         unit = phrase(result.prepared.excitation.unit)
         return f"etwa {conclusion.missing_shots} {unit} mehr, mit Einstellungen wie diesen"
+    if result.per_kilogram:
+        return (
+            "die Masse des Teils, die kein Gleiten zeigt: ohne sie kann keine Zelle mit diesem Modell laufen"
+        )
     if conclusion.remaining.explained:
         return "nichts weiter; ob es so bleibt, zeigt die Abweichung auf der Seite der Zelle"
     place = result.unexplained or next(iter(conclusion.remaining.where), None)

@@ -24,6 +24,8 @@ LARGE_REGION_RMS = 1.25
 """RMS of a region's residuals, in noise floors, from which on it is shown as large."""
 ALL_CLOSED = 0.99
 """Share of a gap from which on more digits would say nothing more."""
+LEAST_TOLD_P = 1e-4
+"""p-value below which none is told: a tail so far out is that of the test's assumptions."""
 MM_PER_M = 1e3
 """Millimetres in a metre: the page shows errors of positions in them."""
 SENTENCES: Mapping[str, ModuleType] = {"en": sentences, "de": german_sentences}
@@ -57,6 +59,7 @@ def report_environment(said: ModuleType) -> Environment:
         words=said.phrase,
         format=lambda form, *values: said.written(form % values),
         number=lambda value: said.written(format_number(value)),
+        p_value=lambda value: said.written(format_p_value(value)),
         grouped=lambda value, decimals: said.written(format_thousands(value, decimals)),
     )
     environment.globals["percent_range"] = lambda *interval: said.written(percent_range(*interval))
@@ -71,6 +74,15 @@ def format_number(value: float) -> str:
     """
     text = f"{value + 0.0:.5g}"
     return format_thousands(float(text), 0) if "e+" in text and abs(value) < 1e7 else text
+
+
+def format_p_value(value: float) -> str:
+    """Write a p-value; none is nought, and no test is sure of its tail beyond the last that is told.
+
+    >>> [format_p_value(value) for value in (0.0123, 0.0001, 3e-17, 0.0)]
+    ['p = 0.012', 'p = 0.0001', 'p < 0.0001', 'p < 0.0001']
+    """
+    return f"p = {value:.2g}" if value >= LEAST_TOLD_P else f"p < {LEAST_TOLD_P:.4f}"
 
 
 def format_thousands(value: float, decimals: int) -> str:
@@ -135,7 +147,7 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
             {
                 "name": phrase(effect),
                 "equation": LIBRARY[effect].equation,
-                "reference": LIBRARY[effect].reference,
+                "reference": said.reference(LIBRARY[effect].reference),
                 "tied": [phrase(item) for item in search.ties.get(effect, ())],
                 "p": result.validation.of_effects[effect].p_value,
                 "change": result.validation.of_effects[effect],

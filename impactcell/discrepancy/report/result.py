@@ -75,6 +75,7 @@ def result_document(result: DiscrepancyResult) -> dict[str, Any]:
                 "expected_without_gap": [_parts(bound) for bound in proof.expected],
             },
         },
+        "per_kilogram": list(result.per_kilogram),
         "simulation": _simulation(result.simulation),
         **_law(result),
         "next_experiment": experiments(result.experiments),

@@ -36,6 +36,11 @@ def note(english: str) -> tuple[str, str]:
     return "en", english
 
 
+def reference(english: str) -> str:
+    """Say where the law of an effect comes from."""
+    return english
+
+
 def reason(english: str) -> tuple[str, str]:
     """Say why nothing is proposed: in which language, and the reason."""
     return "en", english
@@ -103,6 +108,8 @@ def next_step(result: DiscrepancyResult) -> str:
     if conclusion.verdict == UNTESTED:
         unit = result.prepared.excitation.unit
         return f"about {conclusion.missing_shots} {unit} more, at settings like these"
+    if result.per_kilogram:
+        return "the mass of the part, which no slide shows: without it no cell can run with this model"
     if conclusion.remaining.explained:
         return "nothing more; the gap on the cell's page shows whether it stays so"
     place = result.unexplained or next(iter(conclusion.remaining.where), None)

@@ -81,6 +81,10 @@ STUDY_TEXTS: Texts = {
     "did_accept": ("Put into service", "In Betrieb genommen"),
     "did_restore": ("Put back", "Zurückgenommen"),
     "look_at": ("Look at:", "Nachsehen:"),
+    "per_kilogram": (
+        "for a part of 1 kg: no slide states its mass, and no cell can run with this",
+        "für ein Teil von 1 kg: kein Gleiten nennt seine Masse, und keine Zelle kann damit laufen",
+    ),
     "tied_with": ("These shots cannot tell it from", "Diese Stöße unterscheiden es nicht von"),
     "report": ("Report", "Bericht"),
     "report_alone": ("Open report", "Bericht öffnen"),

@@ -180,6 +180,22 @@ async def test_what_speaks_against_the_model_is_told_before_anybody_accepts_it(
     assert "Missing: viscous friction." in shown["en"]
 
 
+@pytest.mark.parametrize("effects", [[], ["viscous_friction"]])
+async def test_a_force_on_a_part_of_unknown_mass_says_so_beside_its_figure(
+    page: Page, verbs: Verbs, effects: list[str]
+) -> None:
+    verbs.outcomes["discrepancy"] = VerbOutcome(0, json.dumps(RESULT | {"per_kilogram": effects}), ())
+    async with page.logged_in(Role.ENGINEER) as client:
+        study, _ = await drop(client, "shots.zip", campaign_zip())
+        await until(page, study, Stage.CONFIRMING)
+        data = {"csrf": await csrf_of(client), "goal": "discrepancy"}
+        await client.post(f"/studies/{study}/run", data=data)
+        await until(page, study, Stage.DONE)
+        for language, said in (("en", "for a part of 1 kg"), ("de", "für ein Teil von 1 kg")):
+            shown = (await client.get(f"/studies/{study}?lang={language}")).text
+            assert (said in shown) is bool(effects)
+
+
 async def test_an_engineer_accepts_and_takes_back(page: Page) -> None:
     async with page.logged_in(Role.ENGINEER) as client:
         study, _ = await drop(client, "shots.zip", campaign_zip())
