@@ -90,6 +90,36 @@ def test_cycles_that_are_left_are_whole_ones_and_the_same_everywhere(browser: Br
         assert browser.run(SHOW, f"Wear/CyclesToLimit{path}", "cycles", content) == part
 
 
+@pytest.mark.parametrize(
+    ("language", "high", "said"),
+    [
+        ("en", 0.0, "limit passed"),
+        ("en", 7.4, "at the limit, perhaps beyond"),
+        ("de", 7.4, "an der Grenze, vielleicht darüber"),
+        ("en", None, "at the limit, perhaps beyond"),
+    ],
+)
+def test_a_limit_is_passed_once_no_cycle_may_be_left(
+    browser: Browser, language: str, high: float | None, said: str
+) -> None:
+    """At most seven cycles were left beside it, and the alarm came thirteen later."""
+    load(browser, language)
+    content = card(
+        Wear__Level=0.2503, Wear__Limit=0.25, Wear__CyclesToLimit=0.0, Wear__CyclesToLimitLow=0.0,
+        Wear__CyclesToLimitHigh=high,
+    )  # fmt: skip
+    assert browser.run("return cyclesLeft(arguments[0])", content["values"]) == said
+
+
+def test_the_reference_batch_has_no_uncertain_offset_to_itself(browser: Browser) -> None:
+    load(browser, "en")
+    content = card(Batch__Offset=0.0, Batch__OffsetStdDev=0.0)
+    content["qualities"] = {"Batch/Offset": "uncertain"}
+    assert browser.run(SHOW, "Batch/Offset", "coefficient", content) == "the reference batch itself"
+    content["values"] |= {"Batch/Offset": 0.012, "Batch/OffsetStdDev": 0.001}
+    assert browser.run(SHOW, "Batch/Offset", "coefficient", content) == "0.0120 ± 0.0020 (uncertain)"
+
+
 @pytest.mark.parametrize("language", ["en", "de"])
 def test_the_number_of_a_cycle_is_written_as_in_the_text_of_an_alarm(browser: Browser, language: str) -> None:
     load(browser, language)

@@ -67,7 +67,7 @@ function showCard(card) {
   const offset = values["Batch/Offset"], std = values["Batch/OffsetStdDev"], gap = values["Model/Gap"];
   const said = {
     cycle_time: moment(card.time_ms),
-    batch_offset: offset === null ? "" : `${std === null ? coefficient(offset) : `${beside(std, offset)} ${toldStd(std)}`} ${texts.batch_offset}`,
+    batch_offset: offset === null ? "" : std === 0 ? texts.reference_batch : `${std === null ? coefficient(offset) : `${beside(std, offset)} ${toldStd(std)}`} ${texts.batch_offset}`,
     estimator: texts[card.estimator],
     mass: withUnit(card.mass, "kg"),
     signature_reason: reasons.signature,

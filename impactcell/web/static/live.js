@@ -42,6 +42,7 @@ export function showValues(root, card) {
     if (typeof value === "boolean") text = value ? texts.yes : texts.no;
     else if (path === "Model/Name") text = card.model[language] || "–";
     else if (typeof value === "string") text = value || "–";
+    else if (path === "Batch/Offset" && std === 0) text = texts.reference_batch;
     else if (std !== null && Number.isFinite(value)) text = [beside(std, value), toldStd(std), unit].filter(Boolean).join(" ");
     else if (form === "band") text = Number.isFinite(value) ? toldStd(value) : "–";
     else if (form === "coefficient") text = coefficient(value);
@@ -50,7 +51,7 @@ export function showValues(root, card) {
     else if (form === "count") text = number(value, 10);
     else text = unit ? withUnit(value, unit) : number(value);
     const kind = quality(card, path);
-    if (text !== "–" && kind !== "good") text += ` (${texts[kind]})`;
+    if (text !== "–" && text !== texts.reference_batch && kind !== "good") text += ` (${texts[kind]})`;
     if (place.textContent !== text) place.textContent = text;
   }
 }
@@ -70,7 +71,7 @@ export function cyclesLeft(values) {
   const level = values["Wear/Level"], limit = values["Wear/Limit"], cycles = values["Wear/CyclesToLimit"];
   const low = values["Wear/CyclesToLimitLow"], high = values["Wear/CyclesToLimitHigh"];
   if (level === null) return "–"; // not known, which is not the same as a limit that is out of sight
-  if (limit !== null && level > limit) return texts.passed;
+  if (limit !== null && level > limit) return high === 0 ? texts.passed : texts.perhaps_passed;
   if (cycles === null) return texts.not_reached;
   const range = low === null ? "" : ` (${texts.from} ${wholeCycles(low)}${high === null ? "" : ` ${texts.to} ${wholeCycles(high)}`})`;
   return `${wholeCycles(cycles)}${range}`;
