@@ -75,7 +75,7 @@ class EventStream:
                 await asyncio.sleep(FRAME_S)
                 with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(changed.wait(), HEARTBEAT_S)
-            await _send(send, b"event: ended\ndata: {}\n\n", more=False)
+            await _send(send, b"", more=False)
         finally:
             self._feed.unsubscribe(changed)
 

@@ -159,11 +159,13 @@ function showUnknown(why) {
 }
 
 const SILENCE_MS = 25000; // two and a half signs of life: a link that is cut without a word ends no stream
+const AGAIN_MS = 5000; // where somebody answers in place of the service, as a proxy does, the browser gives up
 const USED_MS = 600000; // a tab behind others asks so often, for its session to go on as that of one in front
 
 /**
  * Keeps a stream open while the tab is in front, for a browser opens six connections to a host and no more;
- * the browser reconnects by itself, the end of a session leads to the login.
+ * the browser reconnects by itself, the end of a session leads to the login. Nothing else loads the page anew:
+ * while the service is away, nothing would come in its place.
  */
 export function follow(address, handlers) {
   const openAlarms = new Map();
@@ -182,7 +184,7 @@ export function follow(address, handlers) {
     showOffline(heard);
     const answer = await ask();
     if (answer && answer.status === 401) location.reload();
-    else if (!document.hidden && source.readyState === EventSource.CLOSED) setTimeout(() => location.reload(), 5000);
+    else if (source.readyState === EventSource.CLOSED) setTimeout(() => { if (!document.hidden) connect(); }, AGAIN_MS);
   };
   const heardOf = { alive() {} };
   heardOf.alarms = (cell) => {
@@ -203,7 +205,6 @@ export function follow(address, handlers) {
     source = new EventSource(address);
     source.addEventListener("open", hear);
     source.addEventListener("error", lose);
-    source.addEventListener("ended", () => { source.close(); setTimeout(() => location.reload(), 1000); });
     for (const [kind, show] of Object.entries(heardOf)) source.addEventListener(kind, (event) => {
       hear();
       show(JSON.parse(event.data));
