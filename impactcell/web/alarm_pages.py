@@ -84,8 +84,7 @@ async def act(context: PageContext, _: Request, session: BrowserSession, form: d
     try:
         alarm, event = RULES[form.get("alarm", "")].name, ACTIONS[form.get("action", "")]
         shown = bytes.fromhex(form.get("event_id", ""))
-        is_timed = event is EventKind.SHELVE_TIMED  # the form has minutes beside every button
-        shelve_s = 60.0 * float(form.get("minutes") or 0) if is_timed else 0.0
+        shelve_s = 60.0 * float(form.get("minutes") or 0) if event is EventKind.SHELVE_TIMED else 0.0
     except (ValueError, KeyError) as error:
         raise RequestRefusedError(400, "error_form") from error
     cell = form.get("cell", "")

@@ -5,7 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from selenium.webdriver.common.keys import Keys
 
+from impactcell.alarms import EventKind
 from impactcell.scada.users import User, write_users
 from impactcell.web import CellFacts, CellNews, PageServer, PageSettings
 from tests.browser.chromium import Browser
@@ -22,14 +24,21 @@ ROWS_ASKED_FOR = """
 """
 
 
+@pytest.fixture
+def backend(tmp_path: Path) -> Backend:
+    return Backend(tmp_path / "users.yaml")
+
+
 @pytest.fixture(params=[1, 3], ids=["one cell", "three cells"])
-def server(request: pytest.FixtureRequest, browser: Browser, tmp_path: Path) -> Iterator[PageServer]:
+def server(
+    request: pytest.FixtureRequest, browser: Browser, backend: Backend, tmp_path: Path
+) -> Iterator[PageServer]:
     """A page with somebody logged in; each cell has an alarm."""
-    users = tmp_path / "users.yaml"
+    users = backend.users
     write_users(users, {name: User(name, role, password="x") for role, name in NAMES.items()})
     settings = PageSettings("http://127.0.0.1:0", users, tmp_path / "pki", tmp_path / "studies")
     cells = CELLS[: request.param]
-    server = PageServer(settings, [CellFacts(name, "", "") for name in cells], Backend(users))
+    server = PageServer(settings, [CellFacts(name, "", "") for name in cells], backend)
     server.start()
     for cell in cells:
         server.feed.put(CellNews(cell, alarms=(raised(),)))
@@ -98,3 +107,18 @@ def test_what_somebody_writes_stays_until_he_wants_the_list_anew(
     browser.find("#renew").click()
     browser.until(lambda: f"{CELLS[0]}-WearLimit" in listed(browser), "the alarm that came meanwhile")
     assert not browser.all("#renew:not([hidden])")
+
+
+@pytest.mark.parametrize("is_acknowledged", [False, True], ids=["not acknowledged", "to be confirmed"])
+def test_enter_does_what_the_field_is_for(
+    server: PageServer, backend: Backend, browser: Browser, *, is_acknowledged: bool
+) -> None:
+    alarm = replace(raised(), acknowledged=is_acknowledged, confirmed=not is_acknowledged)
+    server.feed.put(CellNews(CELLS[0], alarms=(alarm,)))
+    of_alarm = f'[data-alarm="{CELLS[0]}-DeviantCycle"] input[name={{}}]'
+    for count, (field, text) in enumerate((("minutes", "45"), ("comment", "seen")), start=1):
+        browser.open(f"{server.endpoint}/alarms")
+        browser.write(of_alarm.format(field), f"{text}{Keys.ENTER}")
+        browser.until(lambda count=count: len(backend.acted) == count, "what was done")
+    done = [(action.event, action.comment, action.shelve_s) for _, _, action, _ in backend.acted]
+    assert done == [(EventKind.SHELVE_TIMED, "", 2700.0), (EventKind.COMMENT, "seen", 0.0)]

@@ -176,7 +176,7 @@ async def test_a_form_of_this_page_is_taken(page: Page) -> None:
 
 @pytest.mark.parametrize("minutes", ["30", "long", "nan", ""])
 async def test_minutes_are_for_shelving_alone(page: Page, minutes: str) -> None:
-    """They stand in the form beside every button."""
+    """They hold up no other action, whatever a form sends."""
     events = {
         "acknowledge": EventKind.ACKNOWLEDGE,
         "comment": EventKind.COMMENT,
