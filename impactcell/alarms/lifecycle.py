@@ -174,7 +174,7 @@ class AlarmEvent:
     Attributes
     ----------
     user, comment : str
-        Of a person's action. An empty comment leaves the last one standing.
+        Of a person's action. An empty comment leaves the last one standing, unless that is of somebody else.
     message, severity, evidence
         Of an activation; None leaves what is there.
     shelve_ns : int
@@ -285,6 +285,8 @@ def _with_end_of_shelving(alarm: Alarm, event: AlarmEvent) -> Alarm:
 
 
 def _described(alarm: Alarm, event: AlarmEvent) -> Alarm:
+    is_said = event.comment or event.user not in ("", alarm.user)
+    comment, user = (event.comment, event.user) if is_said else (alarm.comment, alarm.user)
     return replace(
         alarm,
         cycle=event.cycle,
@@ -293,6 +295,6 @@ def _described(alarm: Alarm, event: AlarmEvent) -> Alarm:
         message_de=alarm.message_de if event.message is None else event.message.german,
         severity=alarm.severity if event.severity is None else event.severity,
         evidence=alarm.evidence if event.evidence is None else event.evidence,
-        comment=event.comment or alarm.comment,
-        user=event.user or alarm.user,
+        comment=comment,
+        user=user,
     )

@@ -94,7 +94,7 @@ def comment_fault(text: str) -> str:
 
 
 def _comment_text(value: object, index: int) -> str:
-    """Take a comment: an absent one leaves the last one standing (Part 9, 5.5.6)."""
+    """Take a comment; an absent one is empty."""
     text = (value.Text or "") if isinstance(value, ua.LocalizedText) else ""
     if comment_fault(text):
         raise InvalidArgumentError(index, ua.StatusCodes.BadOutOfRange)
@@ -163,6 +163,8 @@ def _action(
                 raise StatusCodeError(ua.StatusCodes.BadEventIdUnknown)
             activation = condition.alarm.activation
             comment = _comment_text(arguments[1], 1)
+            if event is EventKind.COMMENT and not comment:  # Part 9, 5.5.6
+                raise InvalidArgumentError(1, ua.StatusCodes.BadOutOfRange)
         elif event is EventKind.SHELVE_TIMED:
             shelve_s = arguments[0] / 1e3
             if not 0.0 < shelve_s <= MAX_SHELVE_S:

@@ -235,6 +235,8 @@ class Server:
             raise RefusedError("BadUserAccessDenied")
         if fault := comment_fault(comment):
             raise RefusedError("BadOutOfRange", fault)
+        if event is EventKind.COMMENT and not comment:
+            raise RefusedError("BadInvalidArgument", "a comment has a text")
         shelve_s = 0.0
         if event is EventKind.SHELVE_ONE_SHOT:
             shelve_s = MAX_SHELVE_S

@@ -190,6 +190,16 @@ async def test_a_comment_that_is_no_utf_8_is_refused() -> None:
         assert await act(here, client, "Acknowledge", raised, "grüße") == 0
 
 
+async def test_a_comment_without_a_text_is_refused_and_changes_nothing() -> None:
+    async with site() as here, await here.client("engineer") as client:
+        events = await listening(here, client)
+        raised = here.raise_alarm()
+        shown = (await events.next()).EventId
+        assert await act(here, client, "AddComment", shown, "") == codes.BadInvalidArgument
+        assert here.actions.of(CELL, "WearLimit") == raised
+        assert await act(here, client, "Acknowledge", shown, "") == 0
+
+
 @pytest.mark.parametrize("action", ["Acknowledge", "AddComment"])
 async def test_an_event_id_holds_over_a_restart(tmp_path: Path, action: str) -> None:
     """Not only the newest: a client that was offline acts on the event it has."""

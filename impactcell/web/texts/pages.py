@@ -174,6 +174,10 @@ PAGE_TEXTS: Texts = {
         "der Alarm kam inzwischen wieder; bitte erst ansehen",
     ),
     "refused_BadShelvingTimeOutOfRange": ("1 to 1440 minutes", "1 bis 1440 Minuten"),
+    "refused_BadInvalidArgument": (
+        "nothing stood in the field for the comment",
+        "im Feld für den Kommentar stand nichts",
+    ),
     "refused_BadOutOfRange": ("the comment is too long", "der Kommentar ist zu lang"),
     "refused_other": (
         "the cell cannot do this now; the service's log says why",

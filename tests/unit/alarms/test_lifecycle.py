@@ -216,8 +216,24 @@ def test_comment_and_description_travel_with_the_event():
     done = transition(raised, AlarmEvent(EventKind.COMMENT, 9, 10, user="ann", comment="seen"))
     assert (done.alarm.comment, done.alarm.user, done.alarm.message) == ("seen", "ann", "worn")
     assert done.notifications == (Notification.EVENT,)
-    acknowledged = transition(done.alarm, AlarmEvent(EventKind.ACKNOWLEDGE, 11, 12, user="bob")).alarm
-    assert (acknowledged.comment, acknowledged.user) == ("seen", "bob")
+
+
+@pytest.mark.parametrize(
+    ("kind", "user", "said"),
+    [
+        (EventKind.ACKNOWLEDGE, "ann", ("seen", "ann")),
+        (EventKind.ACKNOWLEDGE, "bob", ("", "bob")),
+        (EventKind.SHELVE_TIMED, "bob", ("", "bob")),
+        (EventKind.CLEAR, "", ("seen", "ann")),
+    ],
+)
+def test_nobody_is_told_to_have_said_what_somebody_else_said(
+    kind: EventKind, user: str, said: tuple[str, str]
+):
+    raised = alarm(Annunciation.UNACKNOWLEDGED)
+    noted = transition(raised, AlarmEvent(EventKind.COMMENT, 9, 10, user="ann", comment="seen")).alarm
+    done = transition(noted, AlarmEvent(kind, 11, 12, user=user, shelve_ns=MINUTE)).alarm
+    assert (done.comment, done.user) == said
 
 
 def test_realarm_calls_again():

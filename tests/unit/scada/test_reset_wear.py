@@ -11,6 +11,7 @@ from impactcell.scada import Actor, ConditionAction, RefusedError, Role
 from impactcell.scada.conditions import MAX_SHELVE_S
 from impactcell.scada.methods import MAX_COMMENT
 from impactcell.scada.server import Server
+from impactcell.web.messages import Messages
 
 HALF = "gr\udcfc"
 """A comment in Latin-1, as a decoder gives it that keeps what it cannot read."""
@@ -63,6 +64,15 @@ async def test_a_comment_that_nothing_can_write_reaches_no_alarm(event: EventKin
         await server.act_on_condition("press-1", "WearLimit", action, actor)
 
 
+async def test_a_comment_without_a_text_reaches_no_alarm() -> None:
+    server = Server.__new__(Server)  # nothing of it is asked
+    action, actor = ConditionAction(EventKind.COMMENT, b""), Actor("anna", Role.ENGINEER, "10.0.0.7")
+    with pytest.raises(RefusedError) as refused:
+        await server.act_on_condition("press-1", "WearLimit", action, actor)
+    for language, sentence in (("en", "nothing stood"), ("de", "stand nichts")):
+        assert sentence in Messages(language).refusal(refused.value.code)
+
+
 async def test_a_time_is_for_what_is_shelved_alone() -> None:
     server, actions = Server.__new__(Server), Actions()
     server._actions = actions  # type: ignore[assignment]
@@ -70,7 +80,7 @@ async def test_a_time_is_for_what_is_shelved_alone() -> None:
     server._conditions = {("press-1", "WearLimit"): seen}  # type: ignore[dict-item]
     timed = (EventKind.SHELVE_TIMED, EventKind.SHELVE_ONE_SHOT)
     for event in (EventKind.ACKNOWLEDGE, EventKind.CONFIRM, EventKind.COMMENT, EventKind.UNSHELVE, *timed):
-        action, actor = ConditionAction(event, b"", "", 1800.0), Actor("anna", Role.ENGINEER, "10.0.0.7")
+        action, actor = ConditionAction(event, b"", "seen", 1800.0), Actor("anna", Role.ENGINEER, "10.0.0.7")
         await server.act_on_condition("press-1", "WearLimit", action, actor)
     shelved = {event: shelve_s for event, shelve_s in actions.acted if shelve_s}
     assert shelved == {EventKind.SHELVE_TIMED: 1800.0, EventKind.SHELVE_ONE_SHOT: MAX_SHELVE_S}

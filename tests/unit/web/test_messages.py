@@ -60,7 +60,7 @@ def test_no_text_is_left_over_or_missing() -> None:
         *(f"folder_{folder}" for folder in FOLDERS),
         *(f"stage_{stage.value}" for stage in Stage),
         *(f"refused_{refusal.value}" for refusal in Refusal),
-        *("refused_BadOutOfRange", "refused_other"),
+        *("refused_BadInvalidArgument", "refused_BadOutOfRange", "refused_other"),
         *(
             "did_accept",
             "did_restore",
