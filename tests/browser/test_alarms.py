@@ -8,6 +8,7 @@ import pytest
 from selenium.webdriver.common.keys import Keys
 
 from impactcell.alarms import EventKind
+from impactcell.records import Shelving
 from impactcell.scada.users import User, write_users
 from impactcell.web import CellFacts, CellNews, PageServer, PageSettings
 from tests.browser.chromium import Browser
@@ -122,3 +123,18 @@ def test_enter_does_what_the_field_is_for(
         browser.until(lambda count=count: len(backend.acted) == count, "what was done")
     done = [(action.event, action.comment, action.shelve_s) for _, _, action, _ in backend.acted]
     assert done == [(EventKind.SHELVE_TIMED, "", 2700.0), (EventKind.COMMENT, "seen", 0.0)]
+
+
+@pytest.mark.parametrize("path", ["/", f"/cells/{CELLS[0]}"])
+def test_what_is_shelved_hides_nothing_that_is_open(server: PageServer, browser: Browser, path: str) -> None:
+    opened = replace(raised("a scratch"), acknowledged=True)
+    shelved = replace(raised("worn"), name="WearLimit", shelving=Shelving.TIMED, time_ns=2 * 10**18)
+    server.feed.put(CellNews(CELLS[0], alarms=(shelved, opened)))
+    browser.open(f"{server.endpoint}{path}?lang=de")
+    told = f'[data-cell="{CELLS[0]}"] .alarm'
+    browser.until(lambda: "▲ " in browser.find(told).text, "the alarm that is open")
+    assert "a scratch" in browser.find(told).text
+    server.feed.put(CellNews(CELLS[0], alarms=(replace(opened, active=False),)))
+    browser.until(lambda: "‖ " in browser.find(told).text, "the alarm that is shelved")
+    assert "(zurückgestellt, nicht quittiert): worn" in browser.find(told).text
+    assert not browser.all(f"{told}.is-open")

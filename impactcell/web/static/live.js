@@ -94,13 +94,14 @@ export function showFriction(root, card) {
   set(root, "batch", values["Batch/BatchId"] || "–");
 }
 
-/** The alarm that matters most: open before cleared, then the latest. */
+/** The alarm that matters most: open before shelved, active before cleared, then the latest. */
 export function lastAlarm(alarms) {
   const told = alarms.filter((alarm) => alarm.message.en);
-  const rank = (alarm) => (alarm.active ? 2 : 0) + (alarm.acknowledged ? 0 : 1);
+  const rank = (alarm) => (isOpen(alarm) ? 4 : 0) + (alarm.active ? 2 : 0) + (alarm.acknowledged ? 0 : 1);
   return told.sort((a, b) => rank(b) - rank(a) || b.time_ms - a.time_ms)[0];
 }
-export const isOpen = (alarm) => alarm.enabled && alarm.shelved === "unshelved" && (alarm.active || !alarm.acknowledged);
+const isShelved = (alarm) => alarm.shelved !== "unshelved";
+export const isOpen = (alarm) => alarm.enabled && !isShelved(alarm) && (alarm.active || !alarm.acknowledged);
 
 export function evidence(alarm) {
   const e = alarm.evidence, parts = [];
@@ -116,11 +117,16 @@ function reason(alarm) {
   return alarm.active ? message : `${texts.cleared} ${message}`;
 }
 
+function headline(alarm) {
+  const sign = isOpen(alarm) ? "▲" : isShelved(alarm) ? "‖" : "○";
+  const state = [isShelved(alarm) && texts.shelved, !alarm.acknowledged && texts.acknowledge].filter(Boolean).join(", ");
+  return `${sign} ${texts[alarm.name]}${state && ` (${state})`}: ${reason(alarm)}`;
+}
+
 export function showAlarm(place, alarms, emptyText) {
   const alarm = lastAlarm(alarms);
-  const open = alarm && isOpen(alarm);
-  place.classList.toggle("is-open", Boolean(open));
-  const lines = alarm ? [`${open ? "▲ " : "○ "}${texts[alarm.name]}${alarm.acknowledged ? "" : ` (${texts.acknowledge})`}: ${reason(alarm)}`, evidence(alarm)] : [emptyText];
+  place.classList.toggle("is-open", Boolean(alarm && isOpen(alarm)));
+  const lines = alarm ? [headline(alarm), evidence(alarm)] : [emptyText];
   place.replaceChildren(...lines.filter(Boolean).map((line, index) => {
     const paragraph = document.createElement("p");
     if (index) paragraph.className = "help";

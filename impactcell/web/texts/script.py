@@ -29,6 +29,7 @@ SCRIPT_TEXTS: Texts = {
     "live_to": ("to", "bis"),
     "live_acknowledge": ("not acknowledged", "nicht quittiert"),
     "live_reference_batch": ("the reference batch itself", "die Bezugscharge selbst"),
+    "live_shelved": ("shelved", "zurückgestellt"),
     "live_batch_offset": ("against the first batch", "gegenüber der ersten Charge"),
     "live_cleared": ("cleared; it said:", "vorbei; gemeldet war:"),
     "live_since_cycle": ("since cycle", "seit Zyklus"),
