@@ -135,6 +135,8 @@ PAGE_TEXTS: Texts = {
     "reason": ("Reason", "Grund"),
     "evidence": ("Evidence", "Nachweis"),
     "by": ("by", "von"),
+    "raised": ("Raised", "Gekommen"),
+    "last_change": ("last change", "letzte Änderung"),
     "comment": ("Comment", "Kommentar"),
     "save_comment": ("Comment", "Kommentieren"),
     "acknowledge": ("Acknowledge", "Quittieren"),

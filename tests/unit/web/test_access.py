@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import re
 from collections.abc import AsyncIterator
 from dataclasses import replace
 from pathlib import Path
@@ -403,6 +404,25 @@ async def test_what_an_alarm_said_is_past_once_it_has_cleared(page: Page, langua
             text = (await client.get(f"/alarms?lang={language}")).text
         assert (f"<p>{said}</p>" in text) is not active
         assert ("○ cleared<" in text) is (language == "en" and not active)
+
+
+@pytest.mark.parametrize(
+    ("came_ms", "changed_ms", "said"),
+    [
+        (5000, 5000, "Raised <5000>, Cycle 7"),
+        (5000, 9000, "Raised <5000>; last change <9000>, Cycle 7"),
+        (0, 9000, "last change <9000>, Cycle 7"),  # of a version that did not keep when it came
+    ],
+)
+async def test_an_open_alarm_says_when_it_came_and_when_it_changed_last(
+    page: Page, came_ms: int, changed_ms: int, said: str
+) -> None:
+    alarm = replace(raised(activation=came_ms * 1_000_000), time_ns=changed_ms * 1_000_000)
+    await put(page, CellNews(CELL, alarms=(alarm,)))
+    async with page.logged_in(Role.OBSERVER) as client:
+        text = (await client.get("/alarms/rows?lang=en")).text
+    shown = re.sub(r'<time data-ms="(\d+)"></time>', r"<\1>", text)
+    assert f'<p class="help">{said}, severity 500' in shown
 
 
 async def test_a_cell_that_places_nothing_shows_no_positioning(page: Page) -> None:
