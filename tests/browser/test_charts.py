@@ -1,6 +1,8 @@
 """Charts as they are drawn: where there is nothing, nothing is."""
 
+from datetime import datetime
 from pathlib import Path
+from zoneinfo import ZoneInfo
 
 import pytest
 
@@ -87,6 +89,30 @@ def test_a_trend_as_wide_as_a_phone_has_its_times(charts: Browser, span_s: int) 
     labels, _ = charts.driver.execute_async_script(LABELS, 320, [times, [1, 2], [2, 3]], {"time": True})
     assert 2 <= len(labels) <= 6
     assert len(set(labels)) == len(labels)
+
+
+@pytest.mark.parametrize(
+    ("begin", "hours", "said"),
+    [
+        ("2026-11-26T06:30", 72, {"12:00\n26 Nov", "00:00\n27 Nov", "12:00", "00:00\n29 Nov"}),
+        ("2026-11-26T22:10", 3, {"22:30\n26 Nov", "00:00\n27 Nov", "01:00"}),
+        ("2026-11-26T08:10", 6, {"10:00", "12:00", "14:00"}),  # of one day
+        ("2026-10-24T06:30", 72, {"00:00\n25 Oct", "00:00\n26 Oct"}),  # the clock is put back on the 25th
+    ],
+)
+def test_a_trend_beyond_midnight_says_which_day(
+    charts: Browser, begin: str, hours: int, said: set[str]
+) -> None:
+    zone = "Europe/Berlin"
+    start = datetime.fromisoformat(begin).replace(tzinfo=ZoneInfo(zone)).timestamp()
+    charts.run("document.documentElement.lang = 'en-GB'")
+    charts.driver.execute_cdp_cmd("Emulation.setTimezoneOverride", {"timezoneId": zone})
+    try:
+        data = [[start, start + 3600.0 * hours], [1, 2], [2, 3]]
+        labels, _ = charts.driver.execute_async_script(LABELS, 600, data, {"time": True})
+    finally:
+        charts.driver.execute_cdp_cmd("Emulation.setTimezoneOverride", {"timezoneId": ""})
+    assert said <= set(labels), labels
 
 
 def test_the_labels_of_an_axis_have_as_many_decimals_as_its_steps(charts: Browser) -> None:

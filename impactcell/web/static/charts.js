@@ -86,8 +86,11 @@ export class Chart {
     const axis = { stroke: colour("soft"), grid: { stroke: colour("grid"), width: 1 }, ticks: { stroke: colour("grid"), width: 1 }, labelSize: 18, labelFont: "12px system-ui, sans-serif" };
     const lang = document.documentElement.lang, clock = { hour: "2-digit", minute: "2-digit", hourCycle: "h23" };
     const times = (_, splits, axis, space, step) => {
-      const form = new Intl.DateTimeFormat(lang, step >= 86400 ? { day: "numeric", month: "short" } : step >= 60 ? clock : { ...clock, second: "2-digit" });
-      return splits.map((seconds) => form.format(new Date(seconds * 1e3)));
+      const day = new Intl.DateTimeFormat(lang, { day: "numeric", month: "short" });
+      const form = step >= 86400 ? day : new Intl.DateTimeFormat(lang, step >= 60 ? clock : { ...clock, second: "2-digit" });
+      const days = splits.map((seconds) => day.format(new Date(seconds * 1e3)));
+      const isDated = form !== day && new Set(days).size > 1; // below the first label of each day
+      return splits.map((seconds, i) => form.format(new Date(seconds * 1e3)) + (isDated && days[i] !== days[i - 1] ? `\n${days[i]}` : ""));
     };
     // All labels of an axis have as many decimals as its steps need: 0.20 beside 0.22.
     const format = (_, values, axis, space, step) => {
