@@ -51,6 +51,11 @@ class VerbOutcome:
         """Whether it did what it was asked for."""
         return self.exit_code == 0
 
+    @property
+    def said(self) -> tuple[str, ...]:
+        """The messages, without the name of the program before them."""
+        return tuple(message.removeprefix("impactcell: ") for message in self.messages)
+
 
 async def run_verb(
     arguments: Sequence[str], timeout_s: float, on_step: Callable[[str], None] | None = None

@@ -92,7 +92,7 @@ class PageGateway:
                 "end others, and try again",
             ) from error
         if not outcome.is_done:
-            said = "\n".join(outcome.messages) or "it took too long"
+            said = "\n".join(outcome.said) or "it took too long"
             raise RefusedError("BadInvalidState", said)
         model = str(json.loads(outcome.output)["model"])
         try:

@@ -203,7 +203,7 @@ async def _change_model(
     extended = context.studies.store.results(study) / "model.extended.yaml"
     if not (study.can_be_restored if action == "restore" else study.can_be_accepted):
         raise RequestRefusedError(409, "error_study_stage")
-    study.accepting, study.faults = action, []
+    study.accepting, study.refusals = action, []
 
     async def change() -> None:
         try:
@@ -215,10 +215,10 @@ async def _change_model(
             done = Acceptance(action, actor.user, context.now_ms(), model)
             study.acceptances = [*study.acceptances, done]
         except RefusedError as error:
-            study.faults = str(error).splitlines()
+            study.refusals = str(error).splitlines()
         except Exception:  # noqa: BLE001 - whatever it was, who asked is told
             _log.exception("study %s: %s of the model of %s failed", study.id, action, study.cell)
-            study.faults = [PROGRAM_FAULT]
+            study.refusals = [PROGRAM_FAULT]
         finally:
             study.accepting = ""
             context.studies.store.save(study)

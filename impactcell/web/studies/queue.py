@@ -95,7 +95,7 @@ class StudyQueue:
             self._begin_working()
 
     def _enqueue(self, study: Study, stage: Stage, work: Callable[[Study], Awaitable[None]]) -> None:
-        study.stage, study.faults, study.steps = stage, [], []
+        study.stage, study.faults, study.refusals, study.steps = stage, [], [], []
         study.result, study.changes = {}, {}  # what came out before is of another reading or question
         shutil.rmtree(self.store.results(study), ignore_errors=True)
         self._waiting.append((study, work))
@@ -219,11 +219,11 @@ def _faults(study: Study, store: StudyStore, outcome: VerbOutcome) -> list[str]:
     """Give what a verb said, with names of files as they were dropped."""
     prefixes = [f"{store.files(study)}/", f"{store.campaign(study)}/", f"{store.directory(study)}/"]
     lines = []
-    for message in outcome.messages or (f"ended with exit code {outcome.exit_code}",):
+    for message in outcome.said or (f"ended with exit code {outcome.exit_code}",):
         text = message
         for prefix in prefixes:
             text = text.replace(prefix, "")
-        lines.append(text.removeprefix("impactcell: "))
+        lines.append(text)
     return lines[-MAX_FAULTS:]
 
 

@@ -17,6 +17,7 @@ ID_BYTES: Final = 9
 """Random bytes of a study's id, 72 bits: nobody guesses an address."""
 MAX_STEPS: Final = 200
 """Steps that are remembered."""
+RESTARTED: Final = "the service was restarted meanwhile"
 
 
 class Stage(enum.Enum):
@@ -71,6 +72,8 @@ class Study(msgspec.Struct):
         What came out: `result.json` of the workflow, or the shots' friction.
     changes : dict
         What accepting the model would change.
+    refusals : list of str
+        Why its model was not put into service, or out of it, when it was last asked for, a line each.
     """
 
     id: str
@@ -89,6 +92,7 @@ class Study(msgspec.Struct):
     changes: dict[str, Any] = {}
     accepting: str = ""
     acceptances: list[Acceptance] = []
+    refusals: list[str] = []
 
     @property
     def is_working(self) -> bool:
@@ -141,11 +145,10 @@ class StudyStore:
         for study in self._studies.values():
             if study.stage not in (Stage.DONE, Stage.FAILED):
                 study.result, study.changes = {}, {}  # of a reading before, as earlier versions kept it
-            if study.is_working or study.stage is Stage.RECEIVING:
-                study.faults = ["the service was restarted meanwhile"]
-                # Where a model was changed meanwhile, what came out stands as before.
-                study.stage = study.stage if study.accepting else Stage.FAILED
-                study.accepting = ""
+            if study.accepting:  # what came out stands as before
+                study.accepting, study.refusals = "", [RESTARTED]
+            elif study.is_working or study.stage is Stage.RECEIVING:
+                study.stage, study.faults = Stage.FAILED, [RESTARTED]
 
     def __iter__(self) -> Iterator[Study]:
         """Give all, the newest first."""

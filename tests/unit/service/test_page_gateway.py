@@ -88,3 +88,13 @@ async def test_a_machine_that_starts_no_program_is_told(monkeypatch: pytest.Monk
     assert told.startswith(
         f"{CELL.name}: ihr Modell bleibt, auf diesem Rechner lässt sich kein Programm starten"
     )
+
+
+async def test_a_refusal_does_not_begin_with_the_name_of_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def refuse(*_: object) -> VerbOutcome:
+        return VerbOutcome(1, "", (f"impactcell: {CELL.name}: part would not slide",))
+
+    monkeypatch.setattr(page_gateway, "run_verb", refuse)
+    gateway = PageGateway({}, OperatorCommands({CELL.name: Task()}), [CELL], Path())  # type: ignore[dict-item]
+    with pytest.raises(RefusedError, match=f"^{CELL.name}: part would not slide$"):
+        await change(gateway, "accept")

@@ -214,7 +214,32 @@ async def test_an_engineer_accepts_and_takes_back(page: Page) -> None:
         found = await until(page, study, Stage.DONE)
     assert page.backend.changed == [(CELL, "model.extended.yaml", "eva"), (CELL, "", "eva")]
     assert [done.action for done in found.acceptances] == ["accept", "restore"]
-    assert found.faults == ["part would not slide"]
+    assert found.refusals == ["part would not slide"]
+
+
+async def test_a_model_that_is_refused_leaves_the_study_as_it_was(page: Page, verbs: Verbs) -> None:
+    refused = f"{CELL}: part would not slide"
+    verbs.outcomes["model"] = VerbOutcome(1, json.dumps(CHANGES | {"refused": refused}), (refused,))
+    async with page.logged_in(Role.ENGINEER) as client:
+        study, _ = await drop(client, "shots.zip", campaign_zip())
+        await until(page, study, Stage.CONFIRMING)
+        csrf = {"csrf": await csrf_of(client)}
+        await client.post(f"/studies/{study}/run", data=csrf | {"goal": "discrepancy"})
+        await until(page, study, Stage.DONE)
+        page.backend.refuses = refused
+        await client.post(f"/studies/{study}/accept", data=csrf)
+        await until(page, study, Stage.DONE)
+        text = (await client.get(f"/studies/{study}/state")).text
+        assert text.count("part would not slide") == 1
+        assert f'action="/studies/{study}/run"' in text
+        assert (
+            await client.post(f"/studies/{study}/run", data=csrf | {"goal": "discrepancy"})
+        ).status_code == 303
+        await until(page, study, Stage.DONE)
+        page.backend.refuses = ""
+        assert (await client.post(f"/studies/{study}/accept", data=csrf)).status_code == 303
+        found = await until(page, study, Stage.DONE)
+    assert (found.refusals, [done.action for done in found.acceptances]) == ([], ["accept"])
 
 
 async def test_a_fault_while_a_model_is_accepted_is_told(
@@ -835,7 +860,7 @@ def test_a_restart_forgets_what_came_out_of_another_reading(tmp_path: Path) -> N
         "done": (Stage.DONE, True),
     }
     assert again["done"].can_be_accepted
-    assert again["done"].faults == ["the service was restarted meanwhile"]
+    assert again["done"].refusals == ["the service was restarted meanwhile"]
 
 
 def test_the_oldest_make_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
