@@ -64,6 +64,7 @@ VIEWS: Final = (
     View("/cells/{cell}", cell_pages.cell),
     View("/cells/{cell}/trend", cell_pages.trend, is_page=False),
     View("/live", cell_pages.live, is_page=False),
+    View("/live/alarms", cell_pages.live_alarms, is_page=False),
     View("/alarms", alarm_pages.alarms),
     View("/alarms/rows", alarm_pages.rows, is_page=False),
     View("/alarms/history.csv", alarm_pages.history_csv),

@@ -61,15 +61,27 @@ async def reset_wear(
 
 
 async def live(context: PageContext, request: Request, session: BrowserSession) -> Response | ASGIApp:
-    """Stream what changes: of all cells, or of one with its last tap."""
-    if context.feed.viewers >= MAX_VIEWERS:
-        return JSONResponse({"error": "too many viewers"}, 503)
+    """Stream what changes: of all cells, or of one with its last tap; alarms are those of all."""
     name = request.query_params.get("cell")
     if name is not None and context.content.find(name) is None:
         return JSONResponse({"error": "no such cell"}, 404)
-    cells = [name] if name is not None else [facts.name for facts in context.content.cells]
-    token = session.token
-    return EventStream(context.feed, cells, name, lambda: context.sessions.find(token) is not None)
+    cards = [name] if name is not None else [facts.name for facts in context.content.cells]
+    return _stream(context, session, cards, name)
+
+
+async def live_alarms(context: PageContext, _: Request, session: BrowserSession) -> Response | ASGIApp:
+    """Stream the alarms alone, for a page that shows no cell."""
+    return _stream(context, session, [], None)
+
+
+def _stream(
+    context: PageContext, session: BrowserSession, cards: list[str], detail: str | None
+) -> Response | ASGIApp:
+    if context.feed.viewers >= MAX_VIEWERS:
+        return JSONResponse({"error": "too many viewers"}, 503)
+    cells, token = [facts.name for facts in context.content.cells], session.token
+    may_go_on = lambda: context.sessions.find(token) is not None  # noqa: E731
+    return EventStream(context.feed, cells, cards, detail, may_go_on)
 
 
 async def trend(context: PageContext, request: Request, _: BrowserSession) -> Response:

@@ -31,6 +31,8 @@ class EventStream:
     ----------
     feed : LiveFeed
     cells : sequence of str
+        Whose alarms are sent: every page counts all that are open.
+    cards : sequence of str
         Whose cards are sent.
     detail : str or None
         The cell whose last tap is sent too.
@@ -39,10 +41,16 @@ class EventStream:
     """
 
     def __init__(
-        self, feed: LiveFeed, cells: Sequence[str], detail: str | None, may_go_on: Callable[[], bool]
+        self,
+        feed: LiveFeed,
+        cells: Sequence[str],
+        cards: Sequence[str],
+        detail: str | None,
+        may_go_on: Callable[[], bool],
     ) -> None:
         self._feed = feed
-        self._streams = [(kind, cell) for cell in cells for kind in ("recent", "alarms", "card")]
+        self._streams = [("alarms", cell) for cell in cells]
+        self._streams += [(kind, cell) for cell in cards for kind in ("recent", "card")]
         if detail:
             self._streams.append(("detail", detail))
         self._may_go_on = may_go_on

@@ -14,7 +14,7 @@ async function load() {
 }
 renew.addEventListener("click", load);
 
-follow("/live", {
+follow("/live/alarms", {
   alarms({ cell, alarms }) {
     const shown = [...open.querySelectorAll("[data-event]")].filter(({ dataset }) => dataset.cell === cell);
     const now = events(alarms.filter((alarm) => alarm.listed).map((alarm) => alarm.event_id));

@@ -42,7 +42,7 @@ function showDetail(detail) {
     if (curves.every((curve) => curve.every((value) => value === null))) charts.signature.clear(texts.not_recorded);
     else charts.signature.show([s.x, s.usual_low ?? none, s.usual_high ?? none, s.low, edge(1), edge(-1), deviant?.friction ?? none],
       deviant ? [{ x: deviant.at, text: `▼ ${texts.cycle} ${deviant.cycle} ${texts.deviates}`, colour: "bad" }] : []);
-  }
+  } else for (const id of ["force", "position", "signature"]) charts[id].clear(texts.no_tap);
   const table = place("taps");
   if (!table) return; // a cell that places nothing
   table.hidden = detail.taps.length === 0;
@@ -138,5 +138,5 @@ function start() {
 follow(`/live?cell=${encodeURIComponent(cell)}`, {
   card: showCard,
   detail: showDetail,
-  alarms: ({ alarms }) => showAlarm(root.querySelector(".alarm"), alarms, ""),
+  alarms: (news) => { if (news.cell === cell) showAlarm(root.querySelector(".alarm"), news.alarms, ""); },
 });

@@ -6,6 +6,10 @@ theme.addEventListener("change", () => {
   document.dispatchEvent(new Event("themechange"));
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => document.dispatchEvent(new Event("themechange")));
+// What came of a form is told once: neither a page that is loaded anew nor one that is bookmarked says it again.
+const told = new URL(location.href);
+for (const name of ["done", "refused"]) told.searchParams.delete(name);
+if (told.search !== location.search) history.replaceState(history.state, "", told);
 // Choosing a language keeps the rest of the address.
 for (const link of document.querySelectorAll(".languages a")) {
   const address = new URL(location.href);

@@ -33,7 +33,8 @@ async function refusal(answer) {
 }
 
 async function send(files) {
-  if (!files.length || isSending) return;
+  if (isSending) return;
+  if (!files.length) return say(texts.no_files, "notice bad");
   isSending = true;
   const total = files.reduce((sum, file) => sum + file.size, 0) || 1;
   let before = 0, id = null;

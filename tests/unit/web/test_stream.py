@@ -28,7 +28,7 @@ class Viewer:
     """The other end of a stream: reads only what it is allowed to."""
 
     def __init__(self, feed: LiveFeed, *, detail: str | None = None, reads: int = 10**6) -> None:
-        self.stream = EventStream(feed, [CELL], detail, lambda: self.may_go_on)
+        self.stream = EventStream(feed, [CELL], [CELL], detail, lambda: self.may_go_on)
         self.may_go_on = True
         self.may_read = asyncio.Semaphore(reads)
         self.bodies: list[bytes] = []
