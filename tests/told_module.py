@@ -42,7 +42,7 @@ class ToldModule(ModuleAcquisition):
 
     async def read_status(self) -> StatusBlock:
         """Show it."""
-        self.status_block = self.shown
+        self._shown = self.shown
         return self.shown
 
 

@@ -66,14 +66,13 @@ class ModuleAcquisition:
         self.link = client.link
         self.registers = registers
         self._log = CellLogger(logging.getLogger(__name__), cell)
-        self.status_block: StatusBlock | None = None
-        """What the module said at the last poll, with cycles numbered on; None before the first."""
+        self._shown: StatusBlock | None = None
         self._client = client
         self.register_client = RegisterClient(client, registers)
         self._status_reader = StatusReader(self.register_client)
         self._reader = CaptureReader(cell, self.register_client)
         self._numbers = CycleNumbers.of(registers["cycle_counter"].kind)
-        self._taken = TakenCycles(None, 0, registers.slots)
+        self._taken = TakenCycles(None, 0, registers.slots, self._numbers)
         self._dates = CycleDates(registers, self._log)
         self._status = ModuleStatus()
         self._on_change = on_change
@@ -92,6 +91,11 @@ class ModuleAcquisition:
             discarded=self._reader.discarded,
             reconnects=max(0, self._connections - 1),
         )
+
+    @property
+    def status_block(self) -> StatusBlock | None:
+        """What the module said at the last poll, with cycles numbered on; None before the first."""
+        return None if self._shown is None else self._numbers.status(self._shown, self._taken.last)
 
     async def __aenter__(self) -> Self:
         """Return the module."""
@@ -116,8 +120,8 @@ class ModuleAcquisition:
 
     async def read_status(self) -> StatusBlock:
         """Read the status block now; raises FieldbusError where `captures` would only note it."""
-        self.status_block = self._numbers.status(await self._status_reader.read(), self._taken.last)
-        return self.status_block
+        self._shown = await self._status_reader.read()
+        return self._numbers.status(self._shown, self._taken.last)
 
     async def acknowledge(self, cycle_id: CycleId) -> None:
         """Tell the module that the cycle `cycle_id` and all before it are durable.
@@ -126,9 +130,10 @@ class ModuleAcquisition:
         module without the registers is not told.
         """
         self._acknowledgement.durable = cycle_id
-        if self._ready.is_set() and self.status_block is not None:
+        status = self.status_block
+        if self._ready.is_set() and status is not None:
             with contextlib.suppress(FieldbusError):  # it is repeated by the next poll
-                await self._acknowledgement.send(self.status_block)
+                await self._acknowledgement.send(status)
 
     async def captures(
         self, after: CycleId | None = None, after_time_ns: int = 0
@@ -142,7 +147,7 @@ class ModuleAcquisition:
         after_time_ns : int
             Its own time; 0 where that is not known.
         """
-        taken = self._taken = TakenCycles(after, after_time_ns, self.registers.slots)
+        taken = self._taken = TakenCycles(after, after_time_ns, self.registers.slots, self._numbers)
         backoff, schedule = Backoff(), PollSchedule()
         loop = asyncio.get_running_loop()
         newest = CycleId(0, 0)
@@ -173,6 +178,9 @@ class ModuleAcquisition:
                     await asyncio.sleep(schedule.delay_s(loop.time()))
                 continue
             choice.record_success()
+            if target.restarted:
+                target = self._numbers.of_new_life(target)
+                newest = replace(newest, cycle=target.counter)
             if fetched.readable:  # not for the status block alone, which says nothing of the window
                 backoff.reset()
             capture = replace(fetched.capture, session=target.cycle_id.session)

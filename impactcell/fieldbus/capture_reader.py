@@ -66,6 +66,8 @@ class CaptureReader:
     ----------
     discarded : int
         Readings thrown away because the capture changed meanwhile or did not fit its CRC.
+    numbers : CycleNumbers
+        How the module counts its cycles.
     """
 
     def __init__(self, cell: str, client: RegisterClient) -> None:
@@ -73,7 +75,7 @@ class CaptureReader:
         self._cell = cell
         self._client = client
         self._registers = client.registers
-        self._numbers = CycleNumbers.of(client.registers["cycle_counter"].kind)
+        self.numbers = CycleNumbers.of(client.registers["cycle_counter"].kind)
         self._spans = _spans(client.registers)
         self._partial: _PartialCapture | None = None
         self._target: NextCapture | None = None
@@ -85,7 +87,8 @@ class CaptureReader:
         """Read the cycle `target`, if that is what its slot shows and it has not been taken before.
 
         A cycle that cannot be read however often it is tried, or not before others behind it would be lost,
-        comes back without content, and `faults` says why.
+        comes back without content, and `faults` says why. One of a module that was started anew has the
+        number that its counter shows.
 
         Raises
         ------
@@ -164,6 +167,8 @@ class CaptureReader:
         if image.values.get("window_slot", target.slot) != target.slot:
             image = await client.read_header()
         header, identity = image.values, self._identifying(image)
+        if self._is_none_since_start(target, header):
+            return NotFetched.NOT_MADE
         if _at_rest(header) and header.get("window_slot", target.slot) == target.slot:
             wanted, shown = target.cycle_id, self._shown(header, target)
             if taken.holds(shown, identity, integer(header.get("cycle_time", 0)), target):
@@ -171,14 +176,21 @@ class CaptureReader:
             if shown != wanted:
                 newer = shown.session == wanted.session and is_after(shown.cycle, wanted.cycle)
                 return NotFetched.OVERWRITTEN if newer else NotFetched.NOT_SHOWN
+            if target.restarted:
+                target = self.numbers.of_new_life(target)
         self._partial = _PartialCapture(target, header, identity, self._covered(image), self._blocks(header))
         self._fewest_missing = self._partial.missing_requests
         return self._partial
 
+    def _is_none_since_start(self, target: NextCapture, header: Mapping[str, Value]) -> bool:
+        """Whether a counter that shows 0 has not gone round: nothing tells but that there is no tap."""
+        cycle_id = target.cycle_id
+        return not (cycle_id.session or self.numbers.shown(cycle_id.cycle) or decoding.tells_of_a_tap(header))
+
     def _shown(self, header: Mapping[str, Value], target: NextCapture) -> CycleId:
         """Which cycle a header is of, as far as it says."""
         name = "window_cycle" if "window_cycle" in header else "cycle_counter"
-        cycle = self._numbers.number(integer(header[name]), near=target.cycle_id.cycle)
+        cycle = self.numbers.number(integer(header[name]), near=target.cycle_id.cycle)
         return CycleId(integer(header.get("window_session", target.cycle_id.session)), cycle)
 
     def _blocks(self, header: Mapping[str, Value], *, again: bool = False) -> dict[str, PartialBlock]:

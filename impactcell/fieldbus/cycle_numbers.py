@@ -2,13 +2,16 @@
 
 A counter of 16 bits begins anew after 65 536 cycles, and with each start of the module. Here cycles are
 numbered on from the last one taken. Whether a counter that shows less has gone round, or the module has been
-started anew, is told by its session; without one it was started anew if that takes far fewer cycles.
+started anew, is told by its session; without one it was started anew if that takes far fewer cycles. One that
+shows a little less than for the last cycle is that of an old reply, or of a module that was started anew: the
+header of the capture decides, and numbers are then what the counter shows.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
+from impactcell.fieldbus.capture_ring import NextCapture
 from impactcell.fieldbus.status_block import UNREADABLE, StatusBlock
 from impactcell.records import CycleId
 
@@ -57,34 +60,41 @@ class CycleNumbers:
         """Return what a counter shows for a cycle."""
         return number if self.period is None else number % self.period
 
+    def of_new_life(self, target: NextCapture) -> NextCapture:
+        """Return a cycle that has proved to be none of those before the last one, as its counter shows it."""
+        cycle_id = replace(target.cycle_id, cycle=self.shown(target.cycle_id.cycle))
+        return replace(target, cycle_id=cycle_id, counter=self.shown(target.counter))
+
     def status(self, status: StatusBlock, last: CycleId | None) -> StatusBlock:
         """Return a status block with numbers that go on from the last cycle taken.
 
         After a start of the module they are what its counter shows. A slot of the ring whose number cannot be
-        read counts as empty. A batch that is announced begins at the cycle nearest to the counter.
+        read counts as empty. A batch that is announced begins at the cycle nearest to the counter. A 0 behind
+        the last cycle is none: of an old reply it has been taken, and after a start nothing has been made.
         """
         if self.period is None and UNREADABLE not in status.ring:
             return status
-        counter = status.cycle_counter
+        newest, is_behind = status.cycle_counter, False
         if self.period is not None and last is not None and last.session == status.session:
             behind = most_behind(len(status.ring))
-            counter = _number_after(last.cycle, counter, self.period, behind, told=bool(status.session))
+            newest = _number_after(last.cycle, newest, self.period, behind, told=bool(status.session))
+            is_behind = newest < last.cycle
         batch = status.batch
         if batch is not None:
-            batch = replace(batch, from_cycle=self.number(batch.from_cycle, near=counter))
-        return replace(
-            status, cycle_counter=counter, ring=tuple(self._ring(status.ring, counter)), batch=batch
-        )
+            batch = replace(batch, from_cycle=self.number(batch.from_cycle, near=newest))
+        ring = tuple(self._ring(status.ring, newest, is_behind=is_behind))
+        is_none = status.cycle_counter == 0 and newest not in ring
+        return replace(status, cycle_counter=0 if is_none else newest, ring=ring, batch=batch)
 
-    def _ring(self, ring: Sequence[int], counter: int) -> Iterator[int]:
-        """Give the numbers of the cycles in a ring whose newest one is `counter`."""
+    def _ring(self, ring: Sequence[int], newest: int, *, is_behind: bool) -> Iterator[int]:
+        """Give the numbers of the cycles in a ring; `is_behind` the last cycle taken is its newest one."""
         for slot, shown in enumerate(ring):
-            if shown == UNREADABLE:
+            if shown == UNREADABLE or (shown == 0 and is_behind):
                 yield 0
             elif shown or self.period is None:
-                yield self.number(shown, near=counter)
+                yield self.number(shown, near=newest)
             else:
-                yield _number_of_zero(ring, slot, counter, self.period)
+                yield _number_of_zero(ring, slot, newest, self.period)
 
 
 def _number_of_zero(ring: Sequence[int], slot: int, counter: int, period: int) -> int:

@@ -29,6 +29,8 @@ OUT_OF_SCALE = 5.0
 """Factor between the module's own figure and its samples: no tap explains it, every wrong unit exceeds it."""
 TIME_AXES = 16
 """Time axes that are kept, of some 160 kB: a map has up to three, and cells of one kind share theirs."""
+_MEASURED = ("peak_force", "sliding_distance", "force_count", "position_count", "sample_count")
+"""Registers of a header that are all 0 where there was no tap."""
 AT_REST = 20
 """One sample in so many, at either end: their median is where the part lay, and no noise is a slide [1]."""
 
@@ -42,6 +44,12 @@ def sample_counts(registers: RegisterMap, header: Mapping[str, Value]) -> dict[s
         name: min(max(_count(registers, header, name)[1], 0), registers[name].count)
         for name in registers.arrays
     }
+
+
+def tells_of_a_tap(header: Mapping[str, Value]) -> bool:
+    """Whether a header says that anything was measured; one that holds no figure of a tap says nothing."""
+    measured = [header[name] for name in _MEASURED if name in header]
+    return not measured or any(measured)
 
 
 def _count(registers: RegisterMap, header: Mapping[str, Value], name: str) -> tuple[str, int]:

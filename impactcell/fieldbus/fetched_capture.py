@@ -12,6 +12,7 @@ class NotFetched(enum.Enum):
     OVERWRITTEN = "the module has put a newer cycle in its place"
     NOT_SHOWN = "its slot shows another cycle: the status block is wrong, or the window"
     TAKEN = "it has been taken before: the status block is old, or wrong"
+    NOT_MADE = "the module has made no cycle since it was started"
     NOT_YET = "no reading of it was of use yet; the ring still holds it"
 
 

@@ -94,7 +94,7 @@ async def _newest(module: ModuleAcquisition, status: StatusBlock) -> tuple[Captu
     cycle_id = CycleId(status.session, counter)
     target = NextCapture(cycle_id, status.ring.index(counter), counter, missed=0, restarted=False)
     reader = CaptureReader(module.cell, module.register_client)
-    fetched = await reader.fetch(target, TakenCycles(None, 0, module.registers.slots))
+    fetched = await reader.fetch(target, TakenCycles(None, 0, module.registers.slots, reader.numbers))
     if isinstance(fetched, NotFetched):
         return None, (f"{module.cell}: cycle {counter}: {fetched.value}",)
     return fetched.capture if fetched.readable else None, fetched.faults

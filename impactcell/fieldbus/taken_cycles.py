@@ -9,7 +9,7 @@ from collections import OrderedDict
 from typing import Final
 
 from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_after
-from impactcell.fieldbus.cycle_numbers import most_behind
+from impactcell.fieldbus.cycle_numbers import CycleNumbers, most_behind
 from impactcell.records import CycleId
 
 _SESSIONS: Final = 16
@@ -27,12 +27,15 @@ class TakenCycles:
         Its own time; 0 where that is not known.
     slots : int
         Cycles that the module's ring holds.
+    numbers : CycleNumbers
+        How it counts them.
     """
 
-    def __init__(self, last: CycleId | None, last_time_ns: int, slots: int) -> None:
+    def __init__(self, last: CycleId | None, last_time_ns: int, slots: int, numbers: CycleNumbers) -> None:
         self.last = last
         self._last_time_ns = last_time_ns
         self._slots = slots
+        self._numbers = numbers
         self._headers: OrderedDict[CycleId, bytes] = OrderedDict()
         self._first_behind: CycleId | None = None
         self._sessions_left: OrderedDict[int, None] = OrderedDict()
@@ -45,8 +48,9 @@ class TakenCycles:
                 self._sessions_left.popitem(last=False)
         self._sessions_left.pop(cycle_id.session, None)
         self.last, self._last_time_ns, self._first_behind = cycle_id, time_ns, None
-        self._headers.pop(cycle_id, None)
-        self._headers[cycle_id] = header
+        shown = self._as_shown(cycle_id)
+        self._headers.pop(shown, None)
+        self._headers[shown] = header
         while len(self._headers) > most_behind(self._slots):
             self._headers.popitem(last=False)
 
@@ -70,8 +74,9 @@ class TakenCycles:
         target : NextCapture
             Where the status block has led to.
         """
-        if shown in self._headers:
-            return self._headers[shown] == header
+        known = self._headers.get(self._as_shown(shown))
+        if known is not None:
+            return known == header
         if not self.is_behind(shown):
             return False
         if time_ns > self._last_time_ns > 0:
@@ -81,3 +86,7 @@ class TakenCycles:
         if self._first_behind is None or self._first_behind.session != shown.session:
             self._first_behind = CycleId(shown.session, target.counter)
         return cycles_after(self._first_behind.cycle, target.counter) < max(1, self._slots // 2)
+
+    def _as_shown(self, cycle_id: CycleId) -> CycleId:
+        """Return what the module shows for a cycle, whichever of its lives that is numbered for."""
+        return CycleId(cycle_id.session, self._numbers.shown(cycle_id.cycle))

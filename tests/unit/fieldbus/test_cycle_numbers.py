@@ -1,6 +1,7 @@
 """Numbers of cycles from counters of few digits. Truth: a plain simulation that counts lives and cycles."""
 
 import asyncio
+import contextlib
 from dataclasses import replace
 
 import pytest
@@ -13,6 +14,7 @@ from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.records import CycleId
+from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice
 from tests.unit.fieldbus.test_acquisition import HEADER, make, running, take
 from tests.unit.fieldbus.test_no_decimals import with_kind
@@ -53,7 +55,7 @@ def followed(module: Counted, last: CycleId | None) -> tuple[CycleId | None, lis
         if want is None:
             return last, taken, missed, restarts
         assert module.status().ring[want.slot] == module.numbers.shown(want.cycle_id.cycle)
-        last = want.cycle_id
+        last = (module.numbers.of_new_life(want) if want.restarted else want).cycle_id
         taken.append(last.cycle)
         missed += want.missed
         restarts += want.restarted
@@ -102,7 +104,7 @@ def test_a_start_of_the_module_is_told_and_makes_up_no_loss(
         module.made = made
         last, taken, missed, restarts = followed(module, last)
         assert last is not None
-        assert [number % module.period for number in taken] == list(range(max(1, made - slots + 1), made + 1))
+        assert taken == list(range(max(1, made - slots + 1), made + 1))
         assert missed <= made - len(taken)  # fewer where it may have gone on counting instead
         assert restarts == 1
 
@@ -198,6 +200,110 @@ async def test_a_small_controller_that_was_started_anew_has_lost_no_thousands(ki
         (received,) = await coming
         assert (received.cycle_id, received.restarted, received.missed) == (CycleId(0, 2), True, 1)
         assert (module.status.restarts, module.status.missed) == (1, 1)
+
+
+def peak(device: ScriptedDevice, peak_n: float) -> None:
+    """Make a cycle that no figure of those before is like."""
+    device.complete({}, velocity=0.05, peak_force=peak_n, sliding_distance=3e-3, batch_id="B-17")
+
+
+async def cancelled(task: asyncio.Future[object]) -> None:
+    task.cancel()
+    with contextlib.suppress(asyncio.CancelledError):
+        await task
+
+
+async def polled(server: ModbusServer, requests: int = 20) -> None:
+    asked = server.requests
+    while server.requests < asked + requests:
+        await asyncio.sleep(0)
+
+
+@pytest.mark.parametrize(("kind", "made"), [("u16", 20), ("u16", 3), ("bcd16", 20), ("bcd16", 60)])
+async def test_a_start_soon_after_the_counter_went_round_begins_with_1(kind: str, made: int) -> None:
+    """No cycle is made up of an empty buffer, and none of the new life has the number of one before."""
+    layout, period = with_kind(SUMMARY, "cycle_counter", kind), PERIODS[kind]
+    device = ScriptedDevice(layout, counter=period - 1)
+    async with running(layout, device, after=CycleId(0, period - 1)) as (server, module, receptions):
+        for cycle in range(period, period + made):
+            peak(device, 100.0 + 0.1 * (cycle - period))
+            assert [each.cycle_id for each in await take(receptions, 1)] == [CycleId(0, cycle)]
+        last = device.image.copy()
+        device.start(session=1)
+        coming = asyncio.ensure_future(take(receptions, 1))
+        await polled(server)
+        assert not coming.done()
+        for cycle in range(1, made + 5):
+            peak(device, 200.0 + 0.1 * cycle)
+            (received,) = await coming
+            assert (received.cycle_id, received.missed) == (CycleId(0, cycle), 0)
+            assert (received.restarted, received.faults) == (cycle == 1, ())
+            assert received.capture.cycle == cycle
+            assert module.status_block is not None
+            assert module.status_block.cycle_counter == cycle
+            coming = asyncio.ensure_future(take(receptions, 1))
+            if cycle == 1:  # what a gateway shows once more of the life before is not taken again
+                now, device.image[:] = device.image.copy(), last
+                await polled(server)
+                device.image[:] = now
+                await polled(server)
+                assert not coming.done()
+        await cancelled(coming)
+        assert (module.status.restarts, module.status.missed, module.status.unreadable) == (1, 0, 0)
+
+
+@pytest.mark.parametrize("before", [65_530, 65_535, 65_536, 65_551])
+@pytest.mark.parametrize("smallest", [True, False])
+async def test_a_counter_of_0_without_a_tap_is_no_cycle(before: int, *, smallest: bool) -> None:
+    """Of a module that was started anew; whether it has gone round instead, its buffer tells."""
+    layout = with_kind(SUMMARY, "cycle_counter", "u16")
+    if smallest:
+        registers = {name: each for name, each in layout.registers.items() if name != "sliding_distance"}
+        layout = replace(layout, registers=registers)
+    device = ScriptedDevice(layout, counter=(before - 1) % 65_536)
+    async with running(layout, device, after=CycleId(0, before - 1)) as (server, module, receptions):
+        figures = {"velocity": 0.05, "peak_force": 130.0}
+        device.complete({}, **figures)
+        assert [each.cycle_id.cycle for each in await take(receptions, 1)] == [before]
+        device.start(session=1)
+        device.put("velocity", 0.05)  # commanded, before any tap
+        coming = asyncio.ensure_future(take(receptions, 1))
+        await polled(server)
+        assert not coming.done()
+        await cancelled(coming)
+        assert (module.status.received, module.status.connected) == (1, True)
+
+
+async def test_a_counter_of_0_with_a_buffer_that_is_not_ready_is_no_cycle() -> None:
+    """However long that lasts; the first tap comes when it is made."""
+    layout = with_kind(with_kind(ONE_BUFFER, "cycle_counter", "u16"), "window_cycle", "u16")
+    layout = replace(layout, registers={n: each for n, each in layout.registers.items() if n != "session"})
+    device = ScriptedDevice(layout, counter=65_534)
+    make_buffer(device)
+    async with running(layout, device, after=CycleId(0, 65_534)) as (server, module, receptions):
+        assert [each.cycle_id.cycle for each in await take(receptions, 1)] == [65_535]
+        device.start(session=1)
+        coming = asyncio.ensure_future(take(receptions, 1))
+        await polled(server, 200)
+        assert not coming.done()
+        make_buffer(device)
+        (received,) = await coming
+        assert (received.cycle_id.cycle % 65_536, received.faults) == (1, ())
+        assert module.status.unreadable == 0
+
+
+async def test_a_ring_that_was_emptied_soon_after_the_counter_went_round_holds_no_cycle_0() -> None:
+    """Also where slot 0 lies beside the first cycle: a ring of four with three of them."""
+    module = Counted("u16", 4, tells=False)
+    for before in (65_541, 65_551, 65_700):
+        for made in range(5):
+            module.made = before
+            module.start()
+            module.made = made
+            last, taken, missed, restarts = followed(module, CycleId(0, before))
+            assert taken == list(range(1, made + 1))
+            assert (missed, restarts) == (0, int(made > 0))
+            assert last == CycleId(0, made or before)
 
 
 async def test_thousands_of_cycles_in_an_outage_are_no_start_where_the_session_is_the_same() -> None:

@@ -1,5 +1,6 @@
 """What is remembered of cycles that were taken: bounded, the oldest forgotten first."""
 
+from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.records import CycleId
 
@@ -8,7 +9,7 @@ REMEMBERED = 16
 
 
 def test_a_session_of_before_is_behind_until_sixteen_others_have_come() -> None:
-    taken = TakenCycles(None, 0, slots=8)
+    taken = TakenCycles(None, 0, 8, CycleNumbers(None))
     for session in range(1, REMEMBERED + 3):
         taken.add(CycleId(session, 1), b"header", 1_000_000_000 * session)
     behind = [session for session in range(1, REMEMBERED + 3) if taken.is_behind(CycleId(session, 1))]
@@ -17,7 +18,7 @@ def test_a_session_of_before_is_behind_until_sixteen_others_have_come() -> None:
 
 
 def test_a_session_that_comes_again_is_the_last_one() -> None:
-    taken = TakenCycles(CycleId(1, 40), 0, slots=8)
+    taken = TakenCycles(CycleId(1, 40), 0, 8, CycleNumbers(None))
     taken.add(CycleId(2, 1), b"header", 0)
     assert taken.is_behind(CycleId(1, 41))
     taken.add(CycleId(1, 41), b"header", 0)
