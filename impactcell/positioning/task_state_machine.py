@@ -250,10 +250,14 @@ def failed(sequence: TaskState, reason: str, evidence: Evidence | None = None) -
 
 
 def aborted(sequence: TaskState, by: str) -> TaskState:
-    """Stop because a person or the PLC says so; not a fault. An outstanding tap is to be cancelled."""
+    """Stop because a person or the PLC says so; not a fault.
+
+    An outstanding tap is to be cancelled; where it leaves the part is not known.
+    """
     if not sequence.running:
         return sequence
-    return replace(sequence, phase=TaskPhase.IDLE, tap=None, reason=f"aborted by {by}")
+    position_m = math.nan if sequence.phase is TaskPhase.WAITING else sequence.position_m
+    return replace(sequence, phase=TaskPhase.IDLE, tap=None, reason=f"aborted by {by}", position_m=position_m)
 
 
 def _plan(sequence: TaskState, cell: PositioningCell, planner: TapPlanner) -> TaskState:

@@ -1,6 +1,7 @@
 """Positioning tasks of a running cell: targets in, taps out over Modbus, until the part is in place."""
 
 import asyncio
+import contextlib
 import logging
 import math
 from collections import deque
@@ -15,8 +16,9 @@ from impactcell.fieldbus.tap_commands import TapCommand, TapCommander
 from impactcell.positioning import PlannerPosterior, task_state_machine
 from impactcell.positioning.task_state_machine import TaskOutcome, TaskPhase, TaskState
 from impactcell.process.cell_logger import CellLogger
-from impactcell.records import Evidence, PositioningState, Quality, Snapshot
+from impactcell.records import Evidence, PositioningState, Snapshot
 from impactcell.service.factory import positioning_cell, tap_planner
+from impactcell.service.known_friction import is_friction_known, kinetic_friction
 from impactcell.service.plc_targets import PlcTargets
 from impactcell.service.worker import CellWorker
 from impactcell.settings import CellConfig
@@ -71,12 +73,16 @@ class PositioningTask:
         self._begun_target: tuple[int, int] | None = None  # session and sequence of the one whose task runs
         self._at_rest = asyncio.Event()  # no tap is under way, also none that was aborted
         self._at_rest.set()
+        self._aborted_at_m = math.nan  # where the tap under way when its task was aborted has left the part
         self._batch_shift_cycle = worker.snapshot.batch.last_shift_cycle if worker.snapshot else 0
 
     @property
     def state(self) -> PositioningState:
         """The task as it is published."""
-        return replace(self._sequence.published(), predictions=self._predictions)
+        published, task = self._sequence.published(), self._sequence
+        if math.isnan(published.remaining_m):
+            published = replace(published, remaining_m=task.target_m - self._aborted_at_m)
+        return replace(published, predictions=self._predictions)
 
     @property
     def fault(self) -> tuple[str, Evidence] | None:
@@ -114,7 +120,7 @@ class PositioningTask:
                 target_m=target_m,
                 position_m=report.position_m,
                 mass_kg=mass_kg,
-                trained=self._trained,
+                trained=is_friction_known(self._worker.snapshot, self._design),
             )
         )
         if self._sequence is not before:
@@ -165,19 +171,12 @@ class PositioningTask:
 
     def update_friction(self, snapshot: Snapshot) -> None:
         """Take over the friction that the tracker believes in; call it in the worker's thread."""
-        wear, batch, ratio = snapshot.wear, snapshot.batch, self._design.model.ratio
-        if wear.quality is Quality.BAD or not math.isfinite(wear.level + wear.level_std):
-            return
-        offset = batch.offset if math.isfinite(batch.offset) else 0.0
-        offset_std = batch.offset_std if math.isfinite(batch.offset_std) else 0.0
-        mu_s = wear.level + offset
-        std = math.hypot(
-            math.hypot(wear.level_std, offset_std) * ratio, mu_s * self._design.model.prior.ratio_std
-        )
-        shifted = batch.last_shift_cycle not in (0, self._batch_shift_cycle)
-        self._batch_shift_cycle = batch.last_shift_cycle
-        if mu_s > 0.0:
-            self._planner.observe_friction(mu_s * ratio, std, batch_changed=shifted)
+        friction = kinetic_friction(snapshot, self._design)
+        if friction is not None:
+            shift_cycle = snapshot.batch.last_shift_cycle
+            shifted = shift_cycle not in (0, self._batch_shift_cycle)
+            self._batch_shift_cycle = shift_cycle
+            self._planner.observe_friction(*friction, batch_changed=shifted)
 
     async def run(self) -> None:
         """Run until cancelled; a task whose tap was interrupted by a fault of the cell is over."""
@@ -257,8 +256,9 @@ class PositioningTask:
                 fault = str(error)
             finally:
                 self._at_rest.set()
-            if self._sequence is not waiting:
-                continue  # what came of it is no other task's business
+            if self._sequence is not waiting:  # what came of it is no other task's business
+                await self._show_where_aborted()
+                continue
             if report is None:
                 self._set_sequence(task_state_machine.failed(waiting, fault))
                 return
@@ -274,12 +274,13 @@ class PositioningTask:
             if self._sequence is waiting:
                 self._set_sequence(after)
 
-    @property
-    def _trained(self) -> bool:
-        """Friction is known: from cycles, or from the commissioning that calibrated the model."""
-        snapshot = self._worker.snapshot
-        seen = snapshot is not None and snapshot.wear.quality is not Quality.BAD
-        return seen or bool(self._design.model.predictors)
+    async def _show_where_aborted(self) -> None:
+        """Publish where the part has come to rest, unless another task has begun meanwhile."""
+        with contextlib.suppress(FieldbusError, PositioningError):  # then it is not known
+            report = await self._positioner.read_report_at_rest()
+            if not self._sequence.running:
+                self._aborted_at_m = report.position_m
+                self._changed()
 
     def _report(self) -> PositioningStatus:
         status_block = None if self._module.status_block is None else self._module.status_block.positioning
@@ -295,5 +296,5 @@ class PositioningTask:
                 self.outcomes.append(now.outcome)
                 if self._begun_target is not None:
                     self._worker.handled_target, self._begun_target = self._begun_target, None
-            self._sequence = now
+            self._sequence, self._aborted_at_m = now, math.nan
             self._changed()

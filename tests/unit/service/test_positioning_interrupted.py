@@ -1,6 +1,7 @@
 """A positioning task that is aborted, replaced, interrupted or begun again: nothing is struck unasked."""
 
 import asyncio
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -104,6 +105,54 @@ async def test_an_abort_before_the_command_is_written_means_that_nothing_is_stru
     await driven
     assert (striker.taps, task.state.running, task.fault) == (0, False, None)
     assert task.state.reason == f"aborted by {OPERATOR}"
+
+
+@pytest.mark.parametrize("finished", [True, False])
+async def test_what_remains_after_an_abort_is_from_where_its_tap_has_left_the_part(
+    module: ToldModule, task: PositioningTask, *, finished: bool
+) -> None:
+    """Whether the module finished that tap or stopped it; until it is at rest nothing is known."""
+    striker = Striker(module, task)
+    await module.read_status()
+    await task.begin(0.02)
+    assert task.state.remaining_m == pytest.approx(0.02)
+    striker.goes_on.clear()
+    driven = asyncio.create_task(task._drive())
+    await striker.began.wait()
+    await task.abort(OPERATOR)
+    assert math.isnan(task.state.remaining_m)
+    assert task.state.target_m == 0.02
+    striker.position_m = 0.0035
+    striker.show()
+    if not finished:
+        striker.fault = PositioningError("tap 1: aborted")
+    striker.goes_on.set()
+    await driven
+    assert task.state.remaining_m == pytest.approx(0.0165)
+    assert (task.state.running, task.fault) == (False, None)
+    await task.begin(0.01)
+    assert task.state.remaining_m == pytest.approx(0.0065)
+
+
+async def test_what_remains_after_an_abort_is_not_known_where_the_module_does_not_say(
+    module: ToldModule, task: PositioningTask
+) -> None:
+    striker = Striker(module, task)
+    await module.read_status()
+    await task.begin(0.02)
+    striker.goes_on.clear()
+    driven = asyncio.create_task(task._drive())
+    await striker.began.wait()
+    await task.abort(OPERATOR)
+
+    async def not_at_rest() -> PositioningStatus:
+        raise PositioningError("the module has not been ready for 10 s")
+
+    striker.read_report_at_rest = not_at_rest  # type: ignore[method-assign]
+    striker.goes_on.set()
+    await driven
+    assert math.isnan(task.state.remaining_m)
+    assert (task.state.running, task.fault) == (False, None)
 
 
 @pytest.mark.parametrize("abort_fault", [None, LinkError("no answer")])
