@@ -11,6 +11,7 @@ from impactcell.cell.preprocessing import fill_defaults
 from impactcell.errors import ConnectionLostError, FieldbusError, LinkError, NoAnswerError, WrongDeviceError
 from impactcell.features import extract, impulse_balance
 from impactcell.fieldbus.acquisition import ModuleAcquisition
+from impactcell.fieldbus.cycle_dates import clock_ahead, seconds_ahead
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.probe import ProbeResult
@@ -57,6 +58,8 @@ def probe(cell: Path) -> None:
         rows += [
             ("look at", text) for text in (*impulse_balance.doubts(tap), *_unlike(config, result.capture))
         ]
+        ahead = clock_ahead(config.register_map, seconds_ahead(result.capture.time_ns))
+        rows += [("look at", ahead)] if ahead else []
     rows += [("no promise", text) for text in not_promised(config.register_map)]
     print_result("\n".join(f"{name:12}{text}" for name, text in rows))
     if result.faults:

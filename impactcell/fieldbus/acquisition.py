@@ -184,12 +184,13 @@ class ModuleAcquisition:
             if fetched.readable:  # not for the status block alone, which says nothing of the window
                 backoff.reset()
             capture = replace(fetched.capture, session=target.cycle_id.session)
-            capture = self._dates.dated(capture, readable=fetched.readable)
+            is_newest = target.cycle_id == newest
+            capture = self._dates.dated(capture, readable=fetched.readable, is_newest=is_newest)
             last = taken.last
             schedule.update(
                 1e-9 * fetched.capture.time_ns or loop.time(),
                 cycles_after(last.cycle, target.cycle_id.cycle) if last and not target.restarted else 0,
-                newest=target.cycle_id == newest,
+                newest=is_newest,
             )
             taken.add(target.cycle_id, fetched.header, fetched.capture.time_ns)
             received = ReceivedCycle(
