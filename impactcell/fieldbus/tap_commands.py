@@ -2,7 +2,8 @@
 
 The parameters are written and read back; only then the command's sequence number is written, and a change of
 that is what the module acts on. Writing the same number again does nothing, so a command whose answer was
-lost with the link is repeated safely.
+lost with the link is repeated safely. For the same reason the next command has another number than one that
+still stands there and was not taken.
 """
 
 import asyncio
@@ -11,7 +12,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
-from impactcell.errors import FieldbusError, LinkError, ModbusExceptionError, PositioningError, ProtocolError
+from impactcell.errors import (
+    FieldbusError,
+    LinkError,
+    ModbusExceptionError,
+    NotDecimalError,
+    PositioningError,
+    ProtocolError,
+)
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.positioning_registers import (
     COMMAND,
@@ -21,7 +29,7 @@ from impactcell.fieldbus.positioning_registers import (
     READY,
     last_sequence,
 )
-from impactcell.fieldbus.status_block import PositioningStatus
+from impactcell.fieldbus.status_block import PositioningStatus, integer
 
 _POLL_S: Final = 0.005
 """Between two looks at the outcome of a tap, seconds: a tenth of the shortest tap and slide."""
@@ -58,6 +66,8 @@ class TapCommander:
         self._module = module
         self._patience_s = patience_s
         self._lock = asyncio.Lock()
+        accepted = module.registers.registers.get("command_accepted")
+        self._accepted_at = None if accepted is None else accepted.address
 
     @property
     def available(self) -> bool:
@@ -81,7 +91,7 @@ class TapCommander:
         """
         self._check(command)
         async with self._lock:
-            commanded = False
+            sequence = 0
             try:
                 async with asyncio.timeout(self._patience_s):
                     session, before = await self._read_positioning()
@@ -89,14 +99,20 @@ class TapCommander:
                         raise PositioningError(
                             f"{self._module.cell}: module takes no command, it is {before.state}"
                         )
+                    number = await self._next_sequence(before.accepted_command)
                     await self._write_parameters(command)
-                    commanded = True
-                    sequence = before.accepted_command % last_sequence(self._module.registers) + 1
-                    return await self._execute(session, sequence, is_wanted)
+                    sequence = number
+                    return await self._execute(session, sequence, before.accepted_command, is_wanted)
             except TimeoutError:
-                struck = "the part may have been struck" if commanded else "nothing has been commanded"
+                cell, shown = self._module.cell, self._accepted_now
+                if sequence and shown not in (None, sequence):
+                    raise PositioningError(
+                        f"{cell}: tap not finished within {self._patience_s:g} s; the module has not taken "
+                        f"command {sequence}, register command_accepted ({self._accepted_at}) shows {shown}"
+                    ) from None
+                struck = "the part may have been struck" if sequence else "nothing has been commanded"
                 raise PositioningError(
-                    f"{self._module.cell}: tap not finished within {self._patience_s:g} s; {struck}"
+                    f"{cell}: tap not finished within {self._patience_s:g} s; {struck}"
                 ) from None
 
     async def read_report(self) -> PositioningStatus:
@@ -204,8 +220,38 @@ class TapCommander:
             else:
                 return
 
-    async def _execute(self, session: int, sequence: int, is_wanted: Callable[[], bool]) -> int:
-        """Write the sequence number until the module has it, and wait for the outcome."""
+    @property
+    def _accepted_now(self) -> int | None:
+        """Number of the last command that the module has taken; None while the link is down."""
+        status = self._module.status_block
+        if status is None or status.positioning is None or not self._module.status.connected:
+            return None
+        return status.positioning.accepted_command
+
+    async def _next_sequence(self, accepted: int) -> int:
+        """Return a number that is neither the last one taken nor the last one written."""
+        register, last = self._module.registers["command_sequence"], last_sequence(self._module.registers)
+        while True:
+            await self._module.wait_connected()
+            try:
+                written = integer(
+                    register.decode(await self._module.register_client.read_words(register.name, 1))
+                )
+            except FieldbusError as error:
+                if _may_pass(error) and not isinstance(error, NotDecimalError):
+                    await asyncio.sleep(_POLL_S)
+                    continue
+                written = accepted  # nobody can tell
+            sequence = (written or accepted) % last + 1
+            return sequence if sequence != accepted else sequence % last + 1
+
+    async def _execute(
+        self, session: int, sequence: int, accepted: int, is_wanted: Callable[[], bool]
+    ) -> int:
+        """Write the sequence number until the module has it, and wait for the outcome.
+
+        Where it takes another one than `accepted` meanwhile, that of an earlier command, nothing is written.
+        """
         cell = self._module.cell
         written = False
         while True:
@@ -218,6 +264,12 @@ class TapCommander:
                 if positioning.result != EXECUTING:
                     raise PositioningError(f"{cell}: tap {sequence}: {positioning.result}")
             elif not written:
+                if positioning.accepted_command != accepted:
+                    raise PositioningError(
+                        f"{cell}: register command_accepted ({self._accepted_at}) has changed from "
+                        f"{accepted} to {positioning.accepted_command} before command {sequence} was "
+                        "written: the module has taken an earlier one; the part may have been struck"
+                    )
                 if not is_wanted():
                     raise PositioningError(f"{cell}: aborted; nothing has been commanded")
                 try:

@@ -79,6 +79,14 @@ GERMAN: Final = {
         r"der Stoß war nach \1 s nicht beendet" + _NOT_COMMANDED_GERMAN,
     r"tap not finished within (\S+) s; the part may have been struck":
         r"der Stoß war nach \1 s nicht beendet; das Teil kann gestoßen worden sein",
+    r"tap not finished within (\S+) s; the module has not taken command (\d+), "
+    r"register (\S+) \((\d+)\) shows (\d+)":
+        r"der Stoß war nach \1 s nicht beendet; das Modul hat den Befehl \2 nicht angenommen, "
+        r"Register \3 (\4) zeigt \5",
+    r"register (\S+) \((\d+)\) has changed from (\d+) to (\d+) before command (\d+) was written: "
+    r"the module has taken an earlier one; the part may have been struck":
+        r"Register \1 (\2) hat sich von \3 auf \4 geändert, bevor der Befehl \5 geschrieben war: "
+        "das Modul hat einen früheren angenommen; das Teil kann gestoßen worden sein",
     r"module was started anew during tap (\d+)": r"das Modul wurde während Stoß \1 neu gestartet",
     r"tap (\d+): (.+)": r"Stoß \1: \2",
     r"the module has not been read for (\S+) s": r"das Modul ließ sich \1 s lang nicht lesen",

@@ -163,6 +163,86 @@ async def test_numbers_of_commands_begin_anew_where_the_narrower_register_ends(
     assert numbers == [last, 1, 2]
 
 
+@pytest.mark.parametrize(
+    ("accepted", "written", "next_one"),
+    [
+        (4, 5, 6),
+        (4, 4, 5),
+        (4, 0, 5),
+        (0, 1, 2),
+        (0, 7, 8),
+        (8, 7, 9),
+        (9999, 1, 2),
+        (5, 9999, 1),
+        (1, 9999, 2),
+    ],
+)
+async def test_a_command_that_was_never_taken_does_not_keep_the_next_from_being_a_change(
+    fpga: RegisterMap, accepted: int, written: int, next_one: int
+) -> None:
+    """A module acts on a change of the number: one that stands there already would never be carried out."""
+    kinds = {"command_sequence": "bcd16", "command_accepted": "bcd16"}
+    narrow = replace(
+        fpga, registers={**fpga.registers, **{n: replace(fpga[n], kind=kind) for n, kind in kinds.items()}}
+    )
+    device = PositioningDevice(narrow)
+    device.put("command_accepted", accepted)
+    device.put("command_sequence", written)
+    async with ready(narrow, device) as (_, _, positioner):
+        assert await positioner.tap(COMMAND) == 1
+    assert (device.get("command_accepted"), len(device.taps)) == (next_one, 1)
+
+
+async def test_a_command_whose_register_shows_no_number_is_counted_on_from_what_was_taken(
+    fpga: RegisterMap,
+) -> None:
+    narrow = replace(
+        fpga,
+        registers={**fpga.registers, "command_sequence": replace(fpga["command_sequence"], kind="bcd16")},
+    )
+    device = PositioningDevice(narrow)
+    number = narrow["command_sequence"]
+    device.image[number.address : number.end] = 0xFFFF
+    device.put("command_accepted", 4)
+    got = device.get
+    device.get = lambda name: got(name) if device.image[number.address] != 0xFFFF else 0  # type: ignore[method-assign]
+    async with ready(narrow, device) as (_, _, positioner):
+        assert await positioner.tap(COMMAND) == 1
+    assert (got("command_accepted"), len(device.taps)) == (5, 1)
+
+
+async def test_a_module_that_takes_no_command_is_told_and_the_next_one_is_another(fpga: RegisterMap) -> None:
+    """It did not look at the first, for it was busy; nothing was struck, and nothing is struck twice."""
+    device = PositioningDevice(fpga)
+    take, deaf = device.write, ScriptedDevice.write
+    device.write = lambda address, words: deaf(device, address, words)  # type: ignore[method-assign]
+    async with ready(fpga, device, patience_s=2.0) as (_, _, positioner):
+        with pytest.raises(PositioningError, match=r"has not taken command 1, register .* \(104\) shows 0$"):
+            await positioner.tap(COMMAND)
+    device.write = take  # type: ignore[method-assign]
+    async with ready(fpga, device) as (_, _, positioner):
+        assert await positioner.tap(COMMAND) == 1
+    assert (device.get("command_accepted"), len(device.taps)) == (2, 1)
+
+
+async def test_a_command_that_is_taken_late_is_not_followed_by_another_tap(fpga: RegisterMap) -> None:
+    """The module looks at the one that was given up while the parameters of the next are written."""
+    device = PositioningDevice(fpga)
+    device.put("command_sequence", 1)
+    take, velocity = device.write, fpga["command_velocity"].address
+
+    def write(address: int, words: Words) -> None:
+        take(address, words)
+        if address <= velocity < address + len(words):
+            device.put("command_accepted", 1)
+
+    device.write = write  # type: ignore[method-assign]
+    async with ready(fpga, device) as (_, _, positioner):
+        with pytest.raises(PositioningError, match="from 0 to 1 before command 2 was written"):
+            await positioner.tap(COMMAND)
+    assert (device.get("command_sequence"), device.taps) == (1, [])
+
+
 async def test_an_answer_lost_with_the_connection_does_not_repeat_the_tap(fpga: RegisterMap) -> None:
     device = PositioningDevice(fpga)
     async with ready(fpga, device) as (server, _, positioner):
