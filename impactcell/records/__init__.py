@@ -30,7 +30,7 @@ from impactcell.records.friction import (
     Signature,
     WearState,
 )
-from impactcell.records.module import BatchAnnouncement, CycleId, ModuleStatus
+from impactcell.records.module import NOT_CONNECTED_YET, BatchAnnouncement, CycleId, ModuleStatus
 from impactcell.records.snapshot import PositioningState, Snapshot, TapPredictions
 from impactcell.records.units import MM_PER_MIN
 
@@ -40,6 +40,7 @@ __all__ = [
     "LARGEST_STATISTIC",
     "MASS_STD",
     "MM_PER_MIN",
+    "NOT_CONNECTED_YET",
     "POSITION_SCALE_STD",
     "VELOCITY_STD",
     "Alarm",

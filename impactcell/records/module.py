@@ -1,6 +1,10 @@
 """What a module says of itself and of what is to come, and the state of the link to it."""
 
 from dataclasses import dataclass
+from typing import Final
+
+NOT_CONNECTED_YET: Final = "not connected yet"
+"""Why there is no link before the first attempt has succeeded or failed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +46,7 @@ class ModuleStatus:
     """
 
     connected: bool = False
-    reason: str = "not connected yet"
+    reason: str = NOT_CONNECTED_YET
     round_trip_s: float = float("nan")
     received: int = 0
     missed: int = 0

@@ -7,7 +7,7 @@ from impactcell.alarms import RuleResult
 from impactcell.alarms.rules import journal_fault, module_connection
 from impactcell.process.cell_logger import CellLogger
 from impactcell.process.condition_log import kind_of
-from impactcell.records import ModuleStatus
+from impactcell.records import NOT_CONNECTED_YET, ModuleStatus
 from impactcell.service.worker import CellWorker
 
 STANDS_S: Final = 5.0
@@ -46,7 +46,12 @@ class FaultAlarms:
         self._journal_told = ""
 
     async def tell_link(self, status: ModuleStatus) -> None:
-        """Tell the state of the link; call it when that has changed, and now and then while it is lost."""
+        """Tell the state of the link; call it when that has changed, and now and then while it is lost.
+
+        Before the first attempt to connect has failed it is no fault.
+        """
+        if status.reason == NOT_CONNECTED_YET:
+            return
         reason = self._link_reason.update(status.reason, time.monotonic())
         await self._tell(module_connection.result(reason, connected=status.connected))
 

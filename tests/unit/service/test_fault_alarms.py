@@ -146,6 +146,30 @@ async def test_a_lost_link_tells_why_it_is_lost_now(
     assert len(await transitions(task, tmp_path, name)) == 4
 
 
+async def test_a_start_of_the_service_is_no_fault_of_the_link(
+    task: CellTask, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each start raised an alarm that a person had to acknowledge; the first attempt that fails is one."""
+    monkeypatch.setattr("impactcell.service.cell_task.TICK_S", 0.0)
+    name, ticks = module_connection.NAME, 0
+    expire = task.worker.expire_shelving
+
+    async def count(time_ns: int) -> None:
+        nonlocal ticks
+        ticks += 1
+        await expire(time_ns)
+
+    monkeypatch.setattr(task.worker, "expire_shelving", count)
+    async with beside(task._tell_link()), beside(task._tick()):
+        async with asyncio.timeout(PATIENCE_S):
+            while ticks < 5:
+                await asyncio.sleep(0)
+        assert not alarm(task, name).active
+        task._module._report_link(connected=False, reason=SILENT)
+        assert (await says(task, name, "no connection within 0.5 s")).active
+    assert [a.active for a in await transitions(task, tmp_path, name)] == [True]
+
+
 class Shown:
     """What OPC UA clients are told of all values of a cell."""
 
