@@ -1,12 +1,12 @@
 """Registers by name, over a client: neighbouring registers are read in as few requests as may be."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from impactcell.errors import ProtocolError
+from impactcell.errors import ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.codec import MAX_WRITE
 from impactcell.fieldbus.map_validation import READ_WRITE
 from impactcell.fieldbus.modbus_client import ModbusClient
@@ -16,6 +16,10 @@ from impactcell.fieldbus.request_batching import PartialBlock
 
 _STABLE_READ_ATTEMPTS: Final = 8
 """Readings of a block of several requests until two agree, before it counts as restless."""
+
+
+_ILLEGAL_ADDRESS: Final = 2
+"""Exception code of a request for what the module does not have."""
 
 
 class RegisterClient:
@@ -105,11 +109,20 @@ class RegisterClient:
         return blocks
 
     async def _read(
-        self, blocks: Iterable[RegisterBlock], write: tuple[int, Words] | None = None
+        self, blocks: Sequence[RegisterBlock], write: tuple[int, Words] | None = None
     ) -> list[Words]:
         parts = [self.modbus.block(block.address, block.count, block.table) for block in blocks]
         at_once = READ_WRITE in self.registers.functions and bool(parts) and parts[0].table == "holding"
-        await self.modbus.complete(*parts, write=write, at_once=at_once)
+        try:
+            await self.modbus.complete(*parts, write=write, at_once=at_once)
+        except ModbusExceptionError as error:
+            if error.code != _ILLEGAL_ADDRESS or not any(block.has_gaps for block in blocks):
+                raise
+            raise ModbusExceptionError(
+                f"{error}; if the module refuses addresses between its registers, say `gaps: false` in map "
+                f"{self.registers.name}",
+                error.code,
+            ) from error
         return [partial_block.words() for partial_block in parts]
 
     async def _read_until_stable(self, block: RegisterBlock, raw: bytes) -> bytes:

@@ -23,6 +23,14 @@ class RegisterBlock:
         """First address after it."""
         return self.address + self.count
 
+    @property
+    def has_gaps(self) -> bool:
+        """Whether it holds addresses that belong to none of its registers."""
+        return any(
+            other.start > max(where.stop for _, where in self.fields[: i + 1])
+            for i, (_, other) in enumerate(self.fields[1:])
+        )
+
     @classmethod
     def of(cls, registers: Sequence[Register]) -> Self:
         """Make the block from the first to the last of `registers`, which are in the order of addresses."""

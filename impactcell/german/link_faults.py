@@ -44,6 +44,13 @@ ANY: Final = "|".join(REQUESTS)
 _REQUEST: Final = "(?P<request>" + re.sub(r"\((?!\?)", "(?:", ANY) + ")"
 _REFUSED: Final = _REQUEST + r" refused: (?P<exception>.+) \(exception (?P<code>\d+)\)"
 _REFUSED_GERMAN: Final = r"\g<request> wird abgelehnt: \g<exception> (Ausnahme \g<code>)"
+_IF_GAPS: Final = (
+    r"; if the module refuses addresses between its registers, say `gaps: false` in map (?P<map>\S+?)"
+)
+_IF_GAPS_GERMAN: Final = (
+    r"; falls das Modul Adressen zwischen seinen Registern ablehnt, in der Karte \g<map> "
+    "`gaps: false` angeben"
+)
 GERMAN: Final = {
     r"no connection within (\S+) s": r"keine Verbindung innerhalb von \1 s",
     r"no connection: nothing listens at this host and port":
@@ -60,6 +67,10 @@ GERMAN: Final = {
     rf"no answer to {_REQUEST} within (?P<s>\S+) s(?:, of \d+ in flight \(window \d+\))?":
         r"keine Antwort auf \g<request> innerhalb von \g<s> s",
     _REFUSED: _REFUSED_GERMAN,
+    _REFUSED + _IF_GAPS: _REFUSED_GERMAN + _IF_GAPS_GERMAN,
+    _REFUSED + _IF_GAPS + r"; this is not a module of map \S+, or device_id (?P<device>\d+) is wrong":
+        _REFUSED_GERMAN + _IF_GAPS_GERMAN + r"; oder das ist kein Modul dieser Karte, oder device_id "
+        r"\g<device> ist falsch",
     _REFUSED + r"; this is not a module of map (?P<map>\S+), or device_id (?P<device>\d+) is wrong":
         _REFUSED_GERMAN + r"; das ist kein Modul der Karte \g<map>, oder device_id \g<device> ist falsch",
     rf"{_REQUEST}: answered with function (?P<other>\d+) instead of (?P<own>\d+)":

@@ -15,6 +15,7 @@ from impactcell.errors import MapError, ModbusExceptionError
 from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.german.link_faults import german_link_fault
 from impactcell.records import CycleId
 from simulator.scripted import ScriptedDevice
 from tests.unit.fieldbus.conftest import MAP
@@ -389,10 +390,17 @@ async def test_a_module_that_refuses_what_lies_between_its_registers(gaps: bool)
     async with running(layout, device) as (_, module, receptions):
         if gaps:
             await module.register_client.modbus.connect()
-            with pytest.raises(ModbusExceptionError, match="illegal data address"):
+            with pytest.raises(ModbusExceptionError, match=r"data address.*`gaps: false` in map") as told:
                 await module.register_client.read_image(
                     ("window_sequence", "actuator_count", "capture_crc32")
                 )
+            assert german_link_fault(str(told.value)).endswith(
+                "diese Adresse gibt es dort nicht (Ausnahme 2); falls das Modul Adressen zwischen seinen "
+                "Registern ablehnt, in der Karte fpga-v1 `gaps: false` angeben"
+            )
+            used.remove(layout["session"].address)
+            with pytest.raises(ModbusExceptionError, match=r"\(exception 2\)$"):  # there is no gap in it
+                await module.register_client.read_image(("session",))
             return
         (received,) = await take(receptions, 1)
         assert received.capture.force is not None
