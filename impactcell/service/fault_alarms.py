@@ -65,6 +65,8 @@ class FaultAlarms:
         if is_news or bool(fault) != active:
             if fault and is_news:
                 self._log.error("%s", fault)
+            elif not fault and self._journal_told:
+                self._log.info("the journal is written again")
             await self._tell_journal(fault)
 
     async def _tell_journal(self, fault: str) -> None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import logging
 import time
 from collections.abc import AsyncIterator, Awaitable
 from dataclasses import replace
@@ -205,6 +206,7 @@ async def test_values_are_of_before_while_the_link_is_there_again_and_no_cycle_h
 async def test_a_journal_tells_what_has_happened_to_it_since(
     task: CellTask, caplog: pytest.LogCaptureFixture
 ) -> None:
+    caplog.set_level(logging.INFO)
     faults, name = FaultAlarms(task.worker, task.log), journal_fault.NAME
     writer = task.worker._journal_writer
     for fault, events, words in (
@@ -221,3 +223,6 @@ async def test_a_journal_tells_what_has_happened_to_it_since(
     await faults.check_journal()
     assert not alarm(task, name).active
     assert len([r for r in caplog.records if "disk is full" in r.getMessage()]) == 2
+    await faults.check_journal()
+    (over,) = [r for r in caplog.records if r.getMessage().endswith("the journal is written again")]
+    assert (over.levelno, over) == (logging.INFO, caplog.records[-1])
