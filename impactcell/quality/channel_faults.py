@@ -84,7 +84,7 @@ def _plateaus(name: str, channel: Channel, shot: int) -> list[DataFault]:
                 f"{channel.time_s[start]:.6g} s "
                 f"({int((values == end).sum())} in all): clipped; choose a wider range"
             )
-            data_faults.append(DataFault(Fault.CLIPPING, name, told, shot))
+            data_faults.append(DataFault(Fault.CLIPPING, name, told, shot, end))
     if is_coarse:
         return data_faults
     inner = ~extreme

@@ -31,9 +31,12 @@ class DataFault:
         What, where, how many, and the way out; without the shot.
     shot : int or None
         None where it shows over all of them.
+    end : float or None
+        Value at which the channel is clipped; None of other faults.
     """
 
     fault: Fault
     channel: str
     message: str
     shot: int | None = None
+    end: float | None = None

@@ -1,6 +1,7 @@
 """Parts of the data by themselves: drives, blocks, columns and what is held out."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from impactcell.campaign import Excitation
+from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.data import driven_blocks, measured_drive, prepare, prepared_campaign
 from impactcell.discrepancy.data.measured_drive import SmoothedDrive, position_response, smooth_drive
 from impactcell.discrepancy.data.noise_at_rest import NoiseAtRest, noise_at_rest, std_of_pieces
@@ -19,7 +20,7 @@ from impactcell.discrepancy.data.unit_checks import PlausibleRatio, check_units
 from impactcell.discrepancy.laws.law import COVARIATE_WORDS
 from impactcell.discrepancy.report import german_sentences
 from impactcell.errors import CampaignError
-from impactcell.records import Capture
+from impactcell.records import Capture, Channel
 from tests.discrepancy.study import Job, campaign, name_effects, quick_campaign
 
 
@@ -293,6 +294,45 @@ def test_lone_outliers_are_no_missing_effect(channel: str, height: float) -> Non
     number = ("force", "position", "actuator").index(channel)
     largest = [np.abs(shot.values[number]).max() for shot in prepared.shots]
     assert largest == pytest.approx([np.abs(shot.values[number]).max() for shot in prepare(made).shots])
+
+
+def clipped(made: Campaign, channel: str, places: Sequence[int], share: float) -> Campaign:
+    """Let a channel of some shots end at a share of its way, whichever the way is."""
+    shots = list(made.shots)
+    for place in places:
+        recorded: Channel = getattr(shots[place], channel)
+        end = share * recorded.values[int(np.abs(recorded.values).argmax())]
+        values = np.minimum(recorded.values, end) if end > 0.0 else np.maximum(recorded.values, end)
+        shots[place] = replace(shots[place], **{channel: replace(recorded, values=values)})
+    return replace(made, shots=tuple(shots))
+
+
+@pytest.mark.parametrize("channel", ["force", "position"])
+def test_clipped_samples_are_left_out_and_so_is_said(channel: str) -> None:
+    made = quick_campaign(Job("single", (), 3, shots=24))
+    places, number = (2, 11, 17), ("force", "position", "actuator").index(channel)
+    prepared, whole = prepare(clipped(made, channel, places, 0.8)), prepare(made)
+    for place, (shot, sound) in enumerate(zip(prepared.shots, whole.shots, strict=True)):
+        for other in {0, 1, 2} - {number}:
+            assert np.array_equal(shot.values[other], sound.values[other])
+        values = sound.values[number]
+        below = np.abs(values) < 0.8 * np.abs(getattr(made.shots[place], channel).values).max()
+        kept = np.isin(sound.times[number], shot.times[number])
+        assert np.isin(shot.values[number], values).all()
+        assert kept.all() if place not in places else below[kept].all()
+        assert (kept | ~below).sum() >= len(values) - 8  # noise dips below the end beside it
+    (said,) = [note for note in prepared.notes if "left out" in note]
+    assert said == "Clipped samples of 3 shots are left out of the fits."
+    assert german_sentences.note(said) == ("de", "Begrenzte Messwerte werden nicht angepasst (Stöße: 3).")
+    assert not any("gap in time" in note for note in prepared.notes)
+
+
+def test_a_force_that_is_clipped_in_some_shots_hides_nothing() -> None:
+    """Fitted, a quarter of the contacts clipped left an unknown gap of several noise floors."""
+    job = Job("single", (), 3, shots=20)
+    made = clipped(quick_campaign(job), "force", range(0, 20, 4), 0.7)
+    found = name_effects(made, seed=job.seed, library=("force_saturation",))
+    assert (found.verdict, found.added) == ("no_gap", ())
 
 
 def test_a_column_takes_no_name_that_the_workflow_has_for_something_else() -> None:

@@ -16,6 +16,7 @@ from impactcell.discrepancy.data.campaign_checks import (
     refuse_rotation,
     without_unlike_shots,
 )
+from impactcell.discrepancy.data.clipped_samples import without_clipped_samples
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
 from impactcell.discrepancy.data.noise_at_rest import NoiseAtRest, noise_at_rest
 from impactcell.discrepancy.data.prepared_shots import (
@@ -116,6 +117,8 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     notes += strategy.missing_information(shots)
     notes += _time_gaps(shots)
     check_shot_units(campaign, shots)
+    if campaign.excitation is not Excitation.DRIVEN:
+        shots = without_clipped_samples(shots, data_faults, notes)
     shots = strategy.with_unstated_masses(shots)
     return PreparedCampaign(
         strategy,

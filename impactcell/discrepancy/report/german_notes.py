@@ -120,6 +120,8 @@ NOTES: Final[Patterns] = (
     (r"Samples before contact \(pretrigger\) of (\d+) shots are left out of the fits\.",
      r"Messwerte vor dem Kontakt (Stöße: \1) werden nicht angepasst."),
     (r"Outliers of (\d+) shots are left out of the fits\.", r"Ausreißer werden nicht angepasst (Stöße: \1)."),
+    (r"Clipped samples of (\d+) shots are left out of the fits\.",
+     r"Begrenzte Messwerte werden nicht angepasst (Stöße: \1)."),
     (r"(\d+) of (\d+) samples stood far from their neighbours and were replaced\.",
      r"\1 von \2 Messwerten lagen weit von ihren Nachbarn und wurden ersetzt."),
     (r"Shot (\d+): what lies before (\S+) s is left out, since the swing grows until then: .*",
