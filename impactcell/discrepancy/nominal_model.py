@@ -79,11 +79,15 @@ class NominalModel:
         problem = problem_of(prepared, self.floor, self.training)
         return NominalModel(prepared, self.floor, self.training, problem, fit_from(problem, self.fit), opened)
 
-    def notes(self, final: Fit) -> tuple[str, ...]:
-        """Say what the shots have of their own that records had told, by the model left in the end."""
-        contact = (contact_note(final),) if ONSET in self.opened else ()
+    def notes(self, final: Fit, *, remains: bool = False) -> tuple[str, ...]:
+        """Say what the shots have of their own that records had told, by the model left in the end.
+
+        Where something remains that it does not explain, their own numbers have taken of it what they could.
+        """
+        contact = (contact_note(final, remains=remains),) if ONSET in self.opened else ()
         told = set(self.problem.shot_parameter_names) - {ONSET}
-        return (*contact, *setting_notes(final, [name for name in self.opened if name in told]))
+        names = [name for name in self.opened if name in told]
+        return (*contact, *setting_notes(final, names, remains=remains))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

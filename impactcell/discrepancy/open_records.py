@@ -12,6 +12,7 @@ from impactcell.discrepancy.model import (
 )
 from impactcell.discrepancy.nominal_model import NominalModel, NominalModels
 from impactcell.discrepancy.search import (
+    Remaining,
     SearchContext,
     SelectionResult,
     fit_between_shots,
@@ -55,9 +56,9 @@ class Basis:
         """What was accepted, else the nominal model."""
         return self.selection.accepted or self.nominal.fit
 
-    def notes_of(self, final: Fit) -> tuple[str, ...]:
-        """Say what is open, by the model that is left in the end."""
-        return (*self.nominal.notes(final), *self.notes)
+    def notes_of(self, final: Fit, remaining: Remaining) -> tuple[str, ...]:
+        """Say what is open, by the model that is left in the end and what remains beside it."""
+        return (*self.nominal.notes(final, remains=not remaining.explained), *self.notes)
 
 
 def find_basis(context: SearchContext, nominals: NominalModels, search: Search) -> Basis:

@@ -233,7 +233,7 @@ def investigate(
         stated = join_intervals(stated, estimate_beside_error(problem, model, prepared))
     return DiscrepancyResult(
         conclusion=conclusion,
-        prepared=replace(prepared, notes=(*prepared.notes, *basis.notes_of(final))),
+        prepared=replace(prepared, notes=(*prepared.notes, *basis.notes_of(final, conclusion.remaining))),
         floor=floor,
         replicates=outcome.replicates,
         training=training,

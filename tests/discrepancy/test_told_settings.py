@@ -123,6 +123,24 @@ def test_a_velocity_farther_off_than_it_may_be_told_is_a_gap_and_is_said() -> No
     assert note(said)[0] == "de"
 
 
+def test_what_shots_have_of_their_own_is_not_told_as_theirs_where_something_remains() -> None:
+    """It takes of what the model lacks what it can: all shots have their contact at t = 0 here."""
+    job = Job("single", ("hertz_contact",), 7_090_001, strength=0.3, shots=30)
+    found, _ = found_in(job, ("surface_tilt",), velocity_scatter=0.006)
+    assert found.verdict == "unknown"
+    assert found.prepared.shots[0].onset_is_open
+    (said,) = [one for one in found.prepared.notes if one.startswith("First contact")]
+    assert said.endswith("; that may be what the model lacks.")
+    nominals = nominals_of(JOB, velocity_scatter=0.002)
+    model = (nominals.contact_free or nominals.exact).with_settings(SETTINGS)
+    plain, doubted = (model.notes(model.fit, remains=remains) for remains in (False, True))
+    for one, other in zip(plain, doubted, strict=True):
+        assert re.findall(r"[+-]?\d+\.?\d*", one)[:2] == re.findall(r"[+-]?\d+\.?\d*", other)[:2]
+        assert other.endswith("; that may be what the model lacks.")
+        assert note(other)[0] == "de"
+        assert note(other)[1].endswith("; das kann sein, was dem Modell fehlt.")
+
+
 def test_a_mass_that_is_told_very_wrong_beside_scatter_is_said_to_be() -> None:
     found, _ = found_in(replace(JOB, shots=60), mass_error=0.05, mass_scatter=0.005)
     (said,) = (one for one in found.prepared.notes if one.startswith("Mass"))

@@ -69,9 +69,14 @@ def contact_scatter(problem: Problem, fitted: Fit) -> ContactScatter:
     )
 
 
-def contact_note(fitted: Fit) -> str:
-    """Say over what time first contact lies."""
+def contact_note(fitted: Fit, *, remains: bool = False) -> str:
+    """Say over what time first contact lies; where something remains, over what time it seems to."""
     first, last = (1e6 * float(of(fitted.shot_parameters.onset_s)) for of in (np.min, np.max))
+    if remains:
+        return (
+            f"First contact is fitted shot by shot and comes out {first:.0f} to {last:.0f} µs from t = 0; "
+            "that may be what the model lacks."
+        )
     return (
         f"First contact lies {first:.0f} to {last:.0f} µs from t = 0, within a sampling step: "
         "it is fitted shot by shot."

@@ -126,8 +126,14 @@ def correlation_chance(r: float, degrees_of_freedom: int) -> float:
     return 2.0 * float(stats.t.sf(t, degrees_of_freedom - 1))
 
 
-def setting_notes(fitted: Fit, names: Sequence[str]) -> tuple[str, ...]:
-    """Say of each of some settings by how much it is off."""
+def setting_notes(fitted: Fit, names: Sequence[str], *, remains: bool = False) -> tuple[str, ...]:
+    """Say of each of some settings by how much it is off; where something remains, how it comes out."""
+    if remains:
+        return tuple(
+            f"{_WORDS[name]} is fitted shot by shot and comes out off what is told by {_off(fitted, name)}; "
+            "that may be what the model lacks."
+            for name in names
+        )
     return tuple(
         f"{_WORDS[name]} is off what is told by {_off(fitted, name)}"
         + ("" if _is_plausible(fitted, name) else f", {_more_than(name)}")

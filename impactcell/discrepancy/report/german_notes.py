@@ -79,6 +79,13 @@ NOTES: Final[Patterns] = (
     (r"First contact lies (\S+) to (\S+) µs from t = 0, .*",
      (r"Der erste Kontakt liegt \1 bis \2 µs von t = 0, innerhalb eines Abtastschritts: "
       "er wird Stoß für Stoß angepasst.")),
+    (r"First contact is fitted shot by shot and comes out (\S+) to (\S+) µs from t = 0; .*",
+     (r"Der erste Kontakt wird Stoß für Stoß angepasst und kommt \1 bis \2 µs von t = 0 heraus; "
+      "das kann sein, was dem Modell fehlt.")),
+    ((r"(Velocity|Mass) is fitted shot by shot and comes out off what is told by (\S+ %) in the mean, "
+      r"(\S+ %) from shot to shot; .*"),
+     lambda m: f"{SETTINGS[m[1].lower()]} wird Stoß für Stoß angepasst und kommt im Mittel um {m[2]}, von "
+     f"Stoß zu Stoß um {m[3]} neben der Angabe heraus; das kann sein, was dem Modell fehlt."),
     ((r"(Velocity|Mass) is off what is told by (\S+ %) in the mean, (\S+ %) from shot to shot"
       r"(?:, more than the (\S+ %) .*)?: it is fitted .*"),
      lambda m: f"{SETTINGS[m[1].lower()]} weicht im Mittel um {m[2]}, von Stoß zu Stoß um {m[3]} von der "
