@@ -85,6 +85,34 @@ def test_effects_are_told_in_a_row(effects: list[str], english: str, german: str
     assert german in german_headline(document)
 
 
+def proposed(functional_form: str) -> Any:
+    """A law over a column of shots.csv, as a result has it."""
+    form = SimpleNamespace(
+        second="",
+        covariates=("temperature_c",),
+        is_between_shots=True,
+        effect=SimpleNamespace(equation="mu (1 + s(temperature_c))"),
+    )
+    gap = SimpleNamespace(of=lambda _: 2.0)
+    return SimpleNamespace(
+        law=SimpleNamespace(
+            refused="",
+            term=SimpleNamespace(form=form),
+            change=SimpleNamespace(parts=(), before=gap, after=gap),
+            proposed=SimpleNamespace(functional_form=functional_form),
+        )
+    )
+
+
+@pytest.mark.parametrize(
+    ("functional_form", "how"),
+    [("u", "in proportion to the temperature c"), ("log(1+u/l)", "as log(1+u/l) of u, the temperature c")],
+)
+def test_a_law_is_told_as_one_would_say_it(functional_form: str, how: str) -> None:
+    said = sentences._proposed(proposed(functional_form))
+    assert said.startswith(f" With s in mu (1 + s(temperature_c)) {how}, a law that no library has, the fric")
+
+
 @pytest.mark.parametrize(
     ("depends_on", "said"),
     [

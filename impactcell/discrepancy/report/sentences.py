@@ -65,10 +65,13 @@ def _proposed(result: DiscrepancyResult) -> str:
     form = finding.term.form
     letters = "u and w" if form.second else "u"
     u = " and ".join(printed(name).replace("_", " ") for name in form.covariates)
-    what = f"a free-form function of {letters}, the {u}"
+    how = f"as a free-form function of {letters}, the {u}"
     if finding.proposed is not None:
-        what = f"{finding.proposed.functional_form} of {letters}, the {u}, a law that no library has"
-    return f" With s in {form.effect.equation} as {what}, the {fall}."
+        function = finding.proposed.functional_form
+        is_proportional = function == "u" and not form.second
+        how = f"in proportion to the {u}" if is_proportional else f"as {function} of {letters}, the {u}"
+        how += ", a law that no library has"
+    return f" With s in {form.effect.equation} {how}, the {fall}."
 
 
 def noise_floor_sentence(result: DiscrepancyResult) -> str:
