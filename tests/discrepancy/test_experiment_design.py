@@ -89,6 +89,19 @@ def test_a_model_is_not_told_from_itself_and_the_less_the_more_friction_scatters
     )
 
 
+def test_where_a_setting_takes_many_shots_another_is_looked_at() -> None:
+    """Two were reckoned for a setting that took 121 when simulated, and two do it at the next one."""
+    tapped = prepare(make("surface_tilt", shots=12))
+    problem = Problem(shot_set(tapped, np.arange(12), sensor_noise(tapped).noise_std), len(tapped.batches))
+    nominal = fit_nominal(problem)
+    tilt, asymmetry = (fitted(problem, nominal, name) for name in ("surface_tilt", "direction_asymmetry"))
+    (proposal,) = propose_experiments(
+        problem, tilt, [("surface_tilt", "direction_asymmetry", asymmetry)], tapped.batches
+    )
+    assert "mm/min" in proposal.setting
+    assert 2 <= proposal.shots <= 6
+
+
 def settings(
     shots: Sequence[PreparedShot], limits: CellLimits = UNLIMITED, masses_kg: Sequence[float] = (1.0,)
 ) -> list[str]:

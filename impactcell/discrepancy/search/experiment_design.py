@@ -26,6 +26,8 @@ MAX_SHOTS = 400
 """More shots than that are no proposal."""
 SIMULATED_SHOTS = 40
 """Shots of a setting that are simulated: their scatter is known to a ninth."""
+FEW_SHOTS = 20
+"""A setting that takes no more than that when it is simulated is proposed, whatever others take."""
 MAX_SIMULATED_SETTINGS = 3
 """Settings, the cheapest first, that are simulated until one keeps what it promises."""
 SIMULATION = 9
@@ -89,19 +91,23 @@ def _cheapest_experiment(
     settings: Sequence[tuple[str, PreparedShot]],
     effects: tuple[str, str],
 ) -> Proposal:
-    feasible: list[tuple[int, str, PreparedShot]] = []
+    feasible: dict[float, tuple[int, str, PreparedShot]] = {}
     for setting, shot in settings:
         separation = _separation(problem, best, rival_fit, shot)
         count = _shots_needed(math.sqrt(max(separation, 0.0)))
-        if count <= MAX_SHOTS:
-            feasible.append((count, setting, shot))
-    for _, setting, shot in sorted(feasible, key=lambda one: one[0])[:MAX_SIMULATED_SETTINGS]:
+        if count <= MAX_SHOTS:  # a dwell that no effect goes with changes nothing
+            feasible.setdefault(separation, (count, setting, shot))
+    proposals = []
+    for _, setting, shot in sorted(feasible.values(), key=lambda one: one[0])[:MAX_SIMULATED_SETTINGS]:
         per_shot = simulated_separation(problem, best, rival_fit, shot)
         count = _shots_needed(per_shot)
         if count <= MAX_SHOTS:
             power = float(norm.cdf(math.sqrt(count) * per_shot - norm.ppf(1.0 - SIGNIFICANCE)))
-            return Proposal(effects, setting, count, power)
-    return Proposal(effects, _separate_measurement(*effects), 0, 1.0)
+            proposals.append(Proposal(effects, setting, count, power))
+        if count <= FEW_SHOTS:
+            break
+    nothing = Proposal(effects, _separate_measurement(*effects), 0, 1.0)
+    return min(proposals, key=lambda proposal: proposal.shots, default=nothing)
 
 
 def _shots_needed(per_shot: float) -> int:
