@@ -18,13 +18,10 @@ from impactcell.web.messages import Messages
 
 def test_a_figure_names_the_setting_of_its_shot() -> None:
     shot = SimpleNamespace(number=7, velocity_m_s=0.02, mass_kg=1.5, direction=-1.0)
-    assert figures._setting(shot, sentences) == "shot 7, 1200 mm/min, 1.5 kg, −"
-    assert (
-        figures._setting(
-            SimpleNamespace(number=7, velocity_m_s=math.nan, mass_kg=math.nan, direction=1.0), sentences
-        )
-        == "shot 7, +"
-    )
+    assert figures._setting(shot, sentences, is_weighed=True) == "shot 7, 1200 mm/min, 1.5 kg, −"
+    assert figures._setting(shot, sentences, is_weighed=False) == "shot 7, 1200 mm/min, −"
+    bare = SimpleNamespace(number=7, velocity_m_s=math.nan, mass_kg=math.nan, direction=1.0)
+    assert figures._setting(bare, sentences, is_weighed=True) == "shot 7, +"
 
 
 def closing(before: Gap, after: Gap, low: float) -> SimpleNamespace:
@@ -128,6 +125,7 @@ def test_nobody_is_asked_for_more_values_of_what_has_no_more(depends_on: tuple[s
     result: Any = SimpleNamespace(
         conclusion=SimpleNamespace(verdict="unknown", remaining=SimpleNamespace(explained=False)),
         unexplained=SimpleNamespace(phase="free_slide", depends_on=depends_on),
+        per_kilogram=False,
     )
     assert sentences.next_step(result) == said
 

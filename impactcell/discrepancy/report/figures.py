@@ -170,7 +170,7 @@ def trace_figure(result: DiscrepancyResult, said: ModuleType) -> str:
                     upper.set_ylabel(f"{said.phrase(CHANNELS[channel])} [{UNITS[channel]}]")
                     lower.set_ylabel(said.label("residual\n[noise std]"))
                 if row == 0:
-                    upper.set_title(_setting(item, is_weighed, said), fontsize=9)
+                    upper.set_title(_setting(item, said, is_weighed=is_weighed), fontsize=9)
                     if column == 0:
                         upper.legend(frameon=False, fontsize=8)
                         if extended:
@@ -189,7 +189,7 @@ def _moving_average(values: np.ndarray, step: int) -> np.ndarray:
     return np.convolve(values, np.ones(step) / step, mode="same")
 
 
-def _setting(shot: Any, is_weighed: bool, said: ModuleType) -> str:  # noqa: FBT001
+def _setting(shot: Any, said: ModuleType, *, is_weighed: bool) -> str:
     parts = [f"{said.label('shot')} {shot.number}"]
     if np.isfinite(shot.velocity_m_s):
         parts.append(f"{shot.velocity_m_s / MM_PER_MIN:.0f} mm/min")
