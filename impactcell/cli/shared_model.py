@@ -1,7 +1,6 @@
 """Which other cells run with a cell's model file: whatever is put into its place, they run with it too."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -18,7 +17,22 @@ CELL_KEYS: Final = (re.compile(r"^cell:", re.MULTILINE), re.compile(r"^model:", 
 
 def cells_sharing(config: CellConfig) -> tuple[str, ...]:
     """Name the cells whose files lie beside that of a cell and name the same model file."""
-    return tuple(dict.fromkeys(_beside(config)))
+    names: dict[str, None] = {}
+    here, model = config.path.resolve(), config.settings.model.resolve()
+    for file in sorted((*here.parent.glob("*.yaml"), *here.parent.glob("*.yml"))):
+        if file.resolve() == here:
+            continue
+        try:
+            text = file.read_text(encoding="utf-8")
+            if not all(key.search(text) for key in CELL_KEYS):
+                continue
+            content, _ = yaml_loader.load(file)
+        except (OSError, UnicodeDecodeError, SettingsError):
+            continue  # it is no cell that runs
+        other, named = (content.get(key) if isinstance(content, dict) else None for key in ("cell", "model"))
+        if isinstance(named, str) and (file.parent / Path(named).expanduser()).resolve() == model:
+            names.setdefault(str(other))
+    return tuple(names)
 
 
 def note_sharing(config: CellConfig, model: Model, sharing: tuple[str, ...]) -> None:
@@ -33,20 +47,3 @@ def note_sharing(config: CellConfig, model: Model, sharing: tuple[str, ...]) -> 
     for source in sources:
         if source.parent != target.resolve().parent:
             print_note(f"{target} needs {source}: keep that file there, or the cell cannot be read any more")
-
-
-def _beside(config: CellConfig) -> Iterator[str]:
-    here, model = config.path.resolve(), config.settings.model.resolve()
-    for file in sorted((*here.parent.glob("*.yaml"), *here.parent.glob("*.yml"))):
-        if file.resolve() == here:
-            continue
-        try:
-            text = file.read_text(encoding="utf-8")
-            if not all(key.search(text) for key in CELL_KEYS):
-                continue
-            content, _ = yaml_loader.load(file)
-        except (OSError, UnicodeDecodeError, SettingsError):
-            continue  # it is no cell that runs
-        other, named = (content.get(key) if isinstance(content, dict) else None for key in ("cell", "model"))
-        if isinstance(named, str) and (file.parent / Path(named).expanduser()).resolve() == model:
-            yield str(other)

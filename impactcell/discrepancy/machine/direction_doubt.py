@@ -83,10 +83,11 @@ def floors_left(rows: Rows, residual: Samples, chosen: np.ndarray, friction: flo
     if not np.isfinite(square).all():
         return MOST_FLOORS
     grid = np.linspace(0.0, math.log(MOST_FLOORS), FLOORS_TRIED)
-    best = int(np.argmin([cost(log_floors) for log_floors in grid]))
+    costs = [cost(log_floors) for log_floors in grid]
+    best = int(np.argmin(costs))
     around = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
     between = minimize_scalar(cost, bounds=around, method="bounded", options={"xatol": FLOORS_TOLERANCE})
-    return math.exp(grid[best] if cost(grid[best]) <= between.fun else between.x)
+    return math.exp(grid[best] if costs[best] <= between.fun else between.x)
 
 
 def _doubt(rows: Rows, friction: float) -> Samples:

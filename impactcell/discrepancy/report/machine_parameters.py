@@ -87,6 +87,7 @@ def parameter_rows(
         for name, item in parameters.items():
             *of, own = name.rsplit(".", 1)
             words, unit = machine_parameter_words(own, coordinate, language)
-            told = {"name": own, "words": words, "unit": unit} | item
-            rows.append({"term": of[0] if of else term} | told | {"unit": told["unit"].removesuffix("1")})
+            told = item.get("unit", unit)
+            said = {"name": own, "words": words, "unit": "" if told == "1" else told}
+            rows.append({"term": of[0] if of else term} | item | said)
     return rows

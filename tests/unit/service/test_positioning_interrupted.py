@@ -89,15 +89,23 @@ async def test_an_abort_while_the_target_of_the_plc_is_being_planned_is_no_fault
     assert (striker.taps, task.state.running, task.fault) == (0, False, None)
 
 
-async def test_an_abort_before_the_command_is_written_means_that_nothing_is_struck(
-    module: ToldModule, task: PositioningTask
-) -> None:
+async def with_a_tap_under_way(
+    module: ToldModule, task: PositioningTask, target_m: float
+) -> tuple["Striker", asyncio.Task[None]]:
+    """Begin a task whose first tap goes on once its striker's `goes_on` is set."""
     striker = Striker(module, task)
     await module.read_status()
-    await task.begin(0.01)
+    await task.begin(target_m)
     striker.goes_on.clear()
     driven = asyncio.create_task(task._drive())
     await striker.began.wait()
+    return striker, driven
+
+
+async def test_an_abort_before_the_command_is_written_means_that_nothing_is_struck(
+    module: ToldModule, task: PositioningTask
+) -> None:
+    striker, driven = await with_a_tap_under_way(module, task, 0.01)
     striker.abort_fault = LinkError("no answer")
     with pytest.raises(PositioningError, match="no further tap is commanded"):
         await task.abort(OPERATOR)
@@ -112,13 +120,8 @@ async def test_what_remains_after_an_abort_is_from_where_its_tap_has_left_the_pa
     module: ToldModule, task: PositioningTask, *, finished: bool
 ) -> None:
     """Whether the module finished that tap or stopped it; until it is at rest nothing is known."""
-    striker = Striker(module, task)
-    await module.read_status()
-    await task.begin(0.02)
+    striker, driven = await with_a_tap_under_way(module, task, 0.02)
     assert task.state.remaining_m == pytest.approx(0.02)
-    striker.goes_on.clear()
-    driven = asyncio.create_task(task._drive())
-    await striker.began.wait()
     await task.abort(OPERATOR)
     assert math.isnan(task.state.remaining_m)
     assert task.state.target_m == 0.02
@@ -137,12 +140,7 @@ async def test_what_remains_after_an_abort_is_from_where_its_tap_has_left_the_pa
 async def test_what_remains_after_an_abort_is_not_known_where_the_module_does_not_say(
     module: ToldModule, task: PositioningTask
 ) -> None:
-    striker = Striker(module, task)
-    await module.read_status()
-    await task.begin(0.02)
-    striker.goes_on.clear()
-    driven = asyncio.create_task(task._drive())
-    await striker.began.wait()
+    striker, driven = await with_a_tap_under_way(module, task, 0.02)
     await task.abort(OPERATOR)
 
     async def not_at_rest() -> PositioningStatus:

@@ -100,6 +100,16 @@ async def until(page: Page, study: str, *stages: Stage) -> Study:
             await asyncio.sleep(0.005)
 
 
+async def investigated(page: Page, client: httpx.AsyncClient) -> tuple[str, dict[str, str]]:
+    """Study of a campaign whose discrepancy has been looked for, and what a form of it has to bring."""
+    study, _ = await drop(client, "shots.zip", campaign_zip())
+    await until(page, study, Stage.CONFIRMING)
+    csrf = {"csrf": await csrf_of(client)}
+    await client.post(f"/studies/{study}/run", data=csrf | {"goal": "discrepancy"})
+    await until(page, study, Stage.DONE)
+    return study, csrf
+
+
 async def test_what_was_read_is_shown_whole_or_not_at_all(
     page: Page, verbs: Verbs, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -167,11 +177,7 @@ async def test_what_speaks_against_the_model_is_told_before_anybody_accepts_it(
     told = CHANGES | {"refused": refused, "shared_with": ["press-2"]}
     verbs.outcomes["model"] = VerbOutcome(1, json.dumps(told), (refused,))
     async with page.logged_in(Role.ENGINEER) as client:
-        study, _ = await drop(client, "shots.zip", campaign_zip())
-        await until(page, study, Stage.CONFIRMING)
-        data = {"csrf": await csrf_of(client), "goal": "discrepancy"}
-        await client.post(f"/studies/{study}/run", data=data)
-        await until(page, study, Stage.DONE)
+        study, _ = await investigated(page, client)
         shown = {code: (await client.get(f"/studies/{study}?lang={code}")).text for code in ("en", "de")}
     assert "the cell&#39;s own taps speak against it" in shown["en"]
     assert "die eigenen Stöße der Zelle sprechen dagegen" in shown["de"]
@@ -186,11 +192,7 @@ async def test_a_force_on_a_part_of_unknown_mass_says_so_beside_its_figure(
 ) -> None:
     verbs.outcomes["discrepancy"] = VerbOutcome(0, json.dumps(RESULT | {"per_kilogram": effects}), ())
     async with page.logged_in(Role.ENGINEER) as client:
-        study, _ = await drop(client, "shots.zip", campaign_zip())
-        await until(page, study, Stage.CONFIRMING)
-        data = {"csrf": await csrf_of(client), "goal": "discrepancy"}
-        await client.post(f"/studies/{study}/run", data=data)
-        await until(page, study, Stage.DONE)
+        study, _ = await investigated(page, client)
         for language, said in (("en", "for a part of 1 kg"), ("de", "für ein Teil von 1 kg")):
             shown = (await client.get(f"/studies/{study}?lang={language}")).text
             assert (said in shown) is bool(effects)
@@ -221,11 +223,7 @@ async def test_a_model_that_is_refused_leaves_the_study_as_it_was(page: Page, ve
     refused = f"{CELL}: part would not slide"
     verbs.outcomes["model"] = VerbOutcome(1, json.dumps(CHANGES | {"refused": refused}), (refused,))
     async with page.logged_in(Role.ENGINEER) as client:
-        study, _ = await drop(client, "shots.zip", campaign_zip())
-        await until(page, study, Stage.CONFIRMING)
-        csrf = {"csrf": await csrf_of(client)}
-        await client.post(f"/studies/{study}/run", data=csrf | {"goal": "discrepancy"})
-        await until(page, study, Stage.DONE)
+        study, csrf = await investigated(page, client)
         page.backend.refuses = refused
         await client.post(f"/studies/{study}/accept", data=csrf)
         await until(page, study, Stage.DONE)
@@ -306,11 +304,7 @@ async def test_nothing_is_accepted_but_what_came_out_last(page: Page, stage: Sta
 
 async def test_what_was_accepted_can_be_taken_back_after_another_reading(page: Page) -> None:
     async with page.logged_in(Role.ENGINEER) as client:
-        study, _ = await drop(client, "shots.zip", campaign_zip())
-        await until(page, study, Stage.CONFIRMING)
-        csrf = {"csrf": await csrf_of(client)}
-        await client.post(f"/studies/{study}/run", data=csrf | {"goal": "discrepancy"})
-        await until(page, study, Stage.DONE)
+        study, csrf = await investigated(page, client)
         await client.post(f"/studies/{study}/accept", data=csrf)
         await until(page, study, Stage.DONE)
         await client.post(f"/studies/{study}/read", data=csrf)
