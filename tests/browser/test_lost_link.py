@@ -225,6 +225,7 @@ async def test_a_tab_behind_others_is_not_logged_out(
     watch = "const ask = fetch; globalThis.fetch = (...what) => { is_used = true; return ask(...what); };"
     await asyncio.to_thread(enter, browser, relay)
     await asyncio.to_thread(browser.run, SEEN, False)
+    await asyncio.to_thread(browser.until, lambda: not server.feed.viewers, "no stream")
     await asyncio.to_thread(browser.run, f"globalThis.is_used = false; {watch}")
     await asyncio.to_thread(browser.driver.execute_async_script, LOOKED)
     assert not browser.run("return is_used")
