@@ -93,7 +93,7 @@ def test_intervals_are_those_of_nonlinear_least_squares_with_the_scatter_between
 
     rows = build_rows(fits.records, fits.base, {viscous.choice: (0.0,), RIPPLE: (period,)}, (0.0, 0.0))
     training, _ = fits.blocks(rows)
-    number = fits._number(rows)
+    number = fits.plan.number(rows)
     inside = np.isin(number, training.number)
     found = least_squares(
         lambda numbers: residuals(numbers)[inside],

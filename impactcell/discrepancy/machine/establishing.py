@@ -58,7 +58,7 @@ def establish(
             if not _is_like_the_machine(fits, training, choice, parts.values())
         ]
         notes = [*notes, *alike_note(fits.candidates, candidates, parts)]
-        search = _search(fits, training, candidates)
+        search = replace(_search(fits, training, candidates), smooth_force=fits.smooth_force(candidates))
         steps = select_terms(search, fits.columns(base_terms))
         for number in numbers:
             steps = told_from_number(search, fits.columns(base_terms), steps, number)

@@ -3,9 +3,17 @@
 from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.finding import MachineFinding, MachineLaw
 from impactcell.discrepancy.machine.model_forces import resistance
+from impactcell.discrepancy.machine.rival_forms import SPLINE_PIECES
 
 GIVES_ENERGY = "with the law that fits best friction would give energy in the range that was gone through"
 """Why no law is proposed where held-out blocks confirm one that cannot be."""
+NOTHING_HELPS = (
+    f"no function of speed, load or position that a spline of {SPLINE_PIECES} pieces can follow helps block "
+    "after block that it was not fitted to"
+)
+"""Why no law is proposed where no spline holds."""
+NOT_IN_ONE_PLACE = "a smooth force of position and speed explains what remains as well as a law in one place"
+"""Why none is proposed where records need no function in one place beside such a force."""
 LEAST_INERTIA = 0.3
 """Times the inertia without a law, below which the law stands in for the drive: with all of it cancelled and
 no inertia the equation of motion is 0 = 0 [1]."""

@@ -30,17 +30,24 @@ from impactcell.discrepancy.machine.held_numbers import (
     sampling_step_s,
 )
 from impactcell.discrepancy.machine.law_proof import proved_form
-from impactcell.discrepancy.machine.law_refusal import GIVES_ENERGY, refusal_of
+from impactcell.discrepancy.machine.law_refusal import (
+    GIVES_ENERGY,
+    NOT_IN_ONE_PLACE,
+    NOTHING_HELPS,
+    refusal_of,
+)
 from impactcell.discrepancy.machine.law_terms import LAW_PREFIX, term_of
 from impactcell.discrepancy.machine.look_alikes import one_way_note
 from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.needs import MIN_NEED, needs_of_free_forms
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
-from impactcell.discrepancy.machine.regression import (
-    Blocks,
-    fit_blocks,
-    out_of_fold_losses,
+from impactcell.discrepancy.machine.regression import Blocks, fit_blocks, out_of_fold_losses
+from impactcell.discrepancy.machine.rival_forms import (
+    COVARIATES,
+    FREE_FORMS,
+    SPLINE_PIECES,
+    columns_of_splines,
 )
-from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, SPLINE_PIECES, splines
 from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, MIN_SHARE_OF_FREE
 from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.ties import TIE_Z
@@ -59,11 +66,6 @@ MOST_FREED = 3
 """Numbers that the base model holds, and beside which a law is looked for."""
 BY_LOAD = TermChoice("load_dependent_friction")
 """Not looked for where it looks like the drive: any law over the load can cancel that then."""
-NOTHING_HELPS = (
-    f"no function of speed, load or position that a spline of {SPLINE_PIECES} pieces can follow helps block "
-    "after block that it was not fitted to"
-)
-"""Why no law is proposed where no spline holds."""
 
 
 def with_law(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
@@ -93,7 +95,7 @@ def with_law(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
 def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNumber | str:
     """Find a law beside the final model, whose nuisances are those of `fits`; else what is in its place."""
     own = tuple(term.choice for term in finding.final.terms[len(finding.nominal.terms) :])
-    training, held_out = fits.blocks(fits.rows_with(own, splines))
+    training, held_out = fits.blocks(fits.rows_with(own, columns_of_splines))
     columns = fits.columns(finding.final.terms)
     fit = fit_blocks(training, columns, fits.priors, fits.nonnegative)
     model = replace(finding.final, base=fits.base, fit=fit)
@@ -107,21 +109,20 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNu
     )
     looked_at = _LookedAt(fits, finding, own, training, held_out, model, before, tuple(tried))
     excess = float(before.sum() - training.noise.sum())
-    least = MIN_SHARE * excess
-    holding = [
-        spline
-        for spline in tried
-        if mean_over_error(spline.gains) >= MIN_GAIN_Z and float(spline.gains.sum()) >= least
-    ]
+    holding = [spline for spline in tried if _holds(spline, MIN_SHARE * excess)]
     if not holding:
         return NOTHING_HELPS
     numbers = looked_at.numbers(NEARLY_ALL * excess)
     as_well = [[one for one, gains in numbers if _stands_for(one, gains, spline)] for spline in holding]
     if as_well[0]:
         return as_well[0][0]
+    needs = needs_of_free_forms(fits.smooth_force(own), columns)
     refused = ""
     for spline, instead in zip(holding, as_well, strict=True):
         if instead:
+            continue
+        if needs[spline.form] < MIN_NEED:
+            refused = refused or NOT_IN_ONE_PLACE
             continue
         law = looked_at.law_in(spline, len(holding))
         fault = refusal_of(finding, law, len(holding))
@@ -131,6 +132,11 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNu
         if fault == GIVES_ENERGY:  # held-out blocks want it all the same: it stands for something else
             break
     return refused
+
+
+def _holds(spline: FreeSpline, least: float) -> bool:
+    """Whether a spline helps block after block."""
+    return mean_over_error(spline.gains) >= MIN_GAIN_Z and float(spline.gains.sum()) >= least
 
 
 def _stands_for(number: HeldNumber, gains: Samples, spline: FreeSpline) -> bool:
@@ -258,7 +264,7 @@ class _Forms:
         forms: Sequence[TermChoice],
     ) -> None:
         self.fits, self.model, self.forms = fits, model, forms
-        self.training, _ = fits.blocks(fits.rows_with(choices, splines))
+        self.training, _ = fits.blocks(fits.rows_with(choices, columns_of_splines))
 
     def _fit_columns(self, form: TermChoice) -> list[Column]:
         return [*self.model.fit.columns, *ChosenTerm(form, 0.0).columns]

@@ -9,28 +9,26 @@ from typing import Self
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import PRIOR_REACH, BaseModel, NumberPrior, TermChoice
+from impactcell.discrepancy.machine.block_plan import BlockPlan
 from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, row_weights, weighed
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.held_numbers import DELAY, HeldNumber
-from impactcell.discrepancy.machine.held_out_stretch import between_gaps
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.model_forces import friction_at_rest
 from impactcell.discrepancy.machine.motion_scale import motion_scale
 from impactcell.discrepancy.machine.nuisance_priors import nuisance_priors
 from impactcell.discrepancy.machine.record_constants import without_constants
 from impactcell.discrepancy.machine.regression import (
-    BLOCKS_OF_RECORD,
     PIECES_PER_BLOCK,
     Blocks,
-    blocks_of,
     fit_blocks,
 )
-from impactcell.discrepancy.machine.rival_forms import Basis
+from impactcell.discrepancy.machine.rival_forms import Freedom
+from impactcell.discrepancy.machine.smooth_force import SmoothForce, smooth_force_columns
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import (
     Column,
-    IndexArray,
     Rows,
     build_rows,
     finer_grid,
@@ -39,10 +37,6 @@ from impactcell.discrepancy.machine.weak_form import (
 )
 from impactcell.records import Samples
 
-RECORDS_FOR_FOLDS = 4
-"""Training records from which on a fold of the cross-validation is a record [1]."""
-FOLDS = 5
-"""Folds of blocks in a row where there are fewer records [1]."""
 DELAY_STEPS = 9
 """Delays that are tried first, evenly over what the prior allows [1]."""
 DELAY_ROUNDS = 2
@@ -80,6 +74,7 @@ class MachineFits:
         self.held = held
         self.scale = motion_scale(records, base.response, base.gravity_torque.value)
         self.block_s = base.block_s if math.isfinite(base.block_s) else self.scale.period_s
+        self.plan = BlockPlan(self.block_s, held)
         self.gravity = base.gravity_torque.value
         self.delay_s = base.delay_s.value
         self.priors = nuisance_priors(base, self.gravity)
@@ -117,9 +112,7 @@ class MachineFits:
         """Rows without a constant of each record, its part that is fitted and its part that is held out."""
         if not self.base.force_offset_by_record:
             return rows
-        number = self._number(rows)
-        _, held = self._fitted_and_held(number)
-        return without_constants(rows, 2 * rows.record.astype(np.int64) + np.isin(number, held), weight)
+        return without_constants(rows, self.plan.part(rows), weight)
 
     @property
     def nonnegative(self) -> frozenset[Column]:
@@ -132,48 +125,22 @@ class MachineFits:
             for column in ChosenTerm(choice, shape).columns
         )
 
-    def rows_with(self, choices: Sequence[TermChoice], basis: Basis) -> Rows:
-        """Rows at the same, of other terms beside the base model's, and of free forms in another basis."""
+    def rows_with(self, choices: Sequence[TermChoice], freedom: Freedom) -> Rows:
+        """Rows at the same, of other terms beside the base model's, and of other free functions."""
         shapes = self._shapes_of((*self.base.terms, *choices))
-        rows = build_rows(self.records, self.base, shapes, (self.gravity, self.delay_s), basis)
+        rows = build_rows(self.records, self.base, shapes, (self.gravity, self.delay_s), freedom)
         return self.prepared(rows)
-
-    def _number(self, rows: Rows) -> IndexArray:
-        """Block of each row."""
-        number: Samples = BLOCKS_OF_RECORD * rows.record + np.floor(rows.time_s / self.block_s)
-        return number.astype(np.int64)
 
     def blocks(self, rows: Rows | None = None) -> tuple[Blocks, Blocks]:
         """Training and held-out blocks of the rows of now, or of others."""
-        rows = rows or self.rows()
-        number = self._number(rows)
-        fitted, held = self._fitted_and_held(number)
-        records = sorted({block // BLOCKS_OF_RECORD for block in fitted})
-        if len(records) >= RECORDS_FOR_FOLDS:
-            fold = {block: records.index(block // BLOCKS_OF_RECORD) for block in fitted}
-        else:
-            fold = {block: place * FOLDS // len(fitted) for place, block in enumerate(fitted)}
-        return blocks_of(rows, number, fold), blocks_of(rows, number, dict.fromkeys(held, 0))
+        return self.plan.blocks(rows or self.rows())
 
-    def _fitted_and_held(self, number: IndexArray) -> tuple[list[int], list[int]]:
-        """Whole blocks that fit, and those that are held out."""
-        sizes = {
-            int(block): int(count)
-            for block, count in zip(*np.unique(number, return_counts=True), strict=True)
-        }
-        usual = float(np.median([*sizes.values()]))
-        whole = [block for block, count in sizes.items() if count >= 0.5 * usual]
-        held = set(self._held_of(whole))
-        return [block for block in whole if block not in held], [block for block in whole if block in held]
-
-    def _held_of(self, whole: Sequence[int]) -> list[int]:
-        """Which of the blocks, in their order, are held out: those of whole records, or the last of each."""
-        members: dict[int, list[int]] = {}
-        for block in whole:
-            members.setdefault(block // BLOCKS_OF_RECORD, []).append(block)
-        if self.held is not None:
-            return [block for record in members if record in self.held for block in members[record]]
-        return [block for blocks in members.values() for block in blocks[len(blocks) - len(blocks) // 3 :]]
+    def smooth_force(self, choices: Sequence[TermChoice]) -> SmoothForce:
+        """Training rows of the base model's terms and others beside a smooth force."""
+        rows = self.rows_with(choices, smooth_force_columns)
+        training, _ = self.blocks(rows)
+        chosen = self.plan.rows_of(rows, training)
+        return SmoothForce(rows, chosen, len(training), self.priors, self.nonnegative)
 
     def columns(self, terms: Iterable[ChosenTerm]) -> list[Column]:
         """Columns of a model: its free nuisances and its terms."""
@@ -245,7 +212,7 @@ class MachineFits:
             residual = residual_of(rows, fit.columns, fit.coefficients)
             at_rest = friction_at_rest(replace(model, fit=fit), self.records, self.scale)
             friction = max(float(level.coefficients[-1]), at_rest)
-            chosen = np.isin(self._number(rows), training.number)
+            chosen = self.plan.rows_of(rows, training)
             self.doubt = DirectionDoubt(friction, floors_left(rows, residual, chosen, friction))
         self.gravity, self.delay_s = built_at
         self.priors = nuisance_priors(self.base, self.gravity)
@@ -289,12 +256,4 @@ class MachineFits:
 
     def held_spans(self) -> tuple[tuple[int, float, float], ...]:
         """Record, begin and end of each stretch of held-out blocks between the gaps of records."""
-        every = self._held_of([int(block) for block in np.unique(self._number(self.rows()))])
-        spans = []
-        for place, record in enumerate(self.records):
-            held = [block for block in every if block // BLOCKS_OF_RECORD == place]
-            if held:
-                begin = (held[0] % BLOCKS_OF_RECORD) * self.block_s if self.held is None else 0.0
-                pieces = between_gaps(record, begin, float(record.time_s[-1]), 0.5 * self.block_s)
-                spans += [(place, *piece) for piece in pieces]
-        return tuple(spans)
+        return self.plan.held_spans(self.rows(), self.records)

@@ -54,8 +54,10 @@ VALUES: Mapping[str, Callable[[MotionState], Samples]] = {
 """Values of each covariate in a motion."""
 Ranges = Mapping[str, tuple[float, float]]
 """Range of each covariate that was gone through."""
-Basis = Callable[[Samples, float, float], Samples]
-"""Functions that a free form is made of, shape (functions, n), of values and the range of a covariate."""
+FreeColumns = dict[tuple[str, float, int], Samples]
+"""Columns of functions that nobody has named, shape (n,) each."""
+Freedom = Callable[[MotionState, Samples, Ranges], FreeColumns]
+"""Gives them by a motion, its direction (-1 to 1), and the range of each covariate."""
 
 
 def hats(values: Samples, lower: float, upper: float) -> Samples:
@@ -69,21 +71,23 @@ def splines(values: Samples, lower: float, upper: float) -> Samples:
     return spline_basis(values, lower, upper, SPLINE_PIECES).T
 
 
-def free_columns(
-    motion: MotionState, direction: Samples, ranges: Ranges, basis: Basis
-) -> dict[tuple[str, float, int], Samples]:
-    """Columns of all free forms, shape (n,) each.
+def columns_of_corners(motion: MotionState, direction: Samples, ranges: Ranges) -> FreeColumns:
+    """Columns of all free forms made of corners."""
+    return _columns(motion, direction, ranges, hats)
 
-    Parameters
-    ----------
-    motion : MotionState
-    direction : ndarray, shape (n,)
-        Of the motion, -1 to 1.
-    ranges : mapping
-    basis : callable
-        `hats` or `splines`.
-    """
-    columns: dict[tuple[str, float, int], Samples] = {}
+
+def columns_of_splines(motion: MotionState, direction: Samples, ranges: Ranges) -> FreeColumns:
+    """Columns of all free forms made of cubic splines."""
+    return _columns(motion, direction, ranges, splines)
+
+
+def _columns(
+    motion: MotionState,
+    direction: Samples,
+    ranges: Ranges,
+    basis: Callable[[Samples, float, float], Samples],
+) -> FreeColumns:
+    columns: FreeColumns = {}
     for form, covariate in COVARIATES.items():
         lower, upper = ranges[covariate]
         functions = basis(VALUES[covariate](motion), lower, upper if upper > lower else lower + 1.0)

@@ -10,9 +10,16 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 from impactcell.discrepancy.machine.base_model import TermChoice
+from impactcell.discrepancy.machine.needs import (
+    MIN_NEED,
+    TIED_NEED,
+    needs_of_free_forms,
+    needs_of_terms,
+)
 from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, PLACES
+from impactcell.discrepancy.machine.smooth_force import SmoothForce
 from impactcell.discrepancy.machine.ties import is_tied, tied_terms
-from impactcell.discrepancy.machine.trials import TermSearch, Trial, mean_over_error
+from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch, Trial, mean_over_error
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.discrepancy.search import MAX_EXPECTED_GAP
 from impactcell.records import Samples
@@ -31,6 +38,8 @@ MAX_TERMS = 2
 what the catalogue lacks [1]."""
 MIN_SECOND_GAP = 2.0
 """Gap in noise floors beside the first term from which on a second one is named [1]."""
+SMOOTH_FORCE = "a smooth force of position and speed explains these records as well as any named term"
+"""Why the best term is not taken where nothing needs it."""
 NOT_IN_EVERY_BLOCK = "no term does better in block after block that it was not fitted to"
 """Why the best term is not taken where its gain scatters too much from block to block."""
 END_OF_RANGE = "the shape of the best term came to the end of its range"
@@ -112,17 +121,43 @@ def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermCh
     gain_of_all = float((before - search.losses([*columns, *every])).sum())
     best = trials[0]
     reason = _refusal(best, free_gains, max(gain_of_all, best.gain), excess)
+    step = SelectionStep(tuple(trials), free_gains, gain_of_all, excess, None, (), reason)
     if reason == NOT_IN_EVERY_BLOCK and best.gain > 0.0 and not best.at_end:
         least = max(MIN_SHARE * excess, MIN_SHARE_OF_ALL * gain_of_all)
         shown = _beside_another(search, (columns, before), trials, least)
         if shown is not None:
-            return SelectionStep(tuple(trials), free_gains, gain_of_all, excess, shown[0], (), "", shown[1])
-    tied: tuple[str, ...] = ()
+            return replace(step, accepted=shown[0], beside=shown[1], reason="")
     if not reason:
-        tied = tied_terms(search, before, best, trials[1:])
-    return SelectionStep(
-        tuple(trials), free_gains, gain_of_all, excess, None if reason else best, tied, reason
-    )
+        step = replace(step, accepted=best, tied_with=tied_terms(search, before, best, trials[1:]))
+    if search.smooth_force is None:
+        return step
+    return _beside_smooth_force(search, search.smooth_force, columns, step)
+
+
+def _beside_smooth_force(
+    search: TermSearch, smooth_force: SmoothForce, columns: list[Column], step: SelectionStep
+) -> SelectionStep:
+    """Take the term that the records need most beside a smooth force, if they need any."""
+    choices = {trial.term.choice.name: trial.term.choice for trial in step.trials}
+    needs = needs_of_terms(smooth_force, columns, [*choices.values()], search.shapes)
+    most = max(needs, key=lambda name: needs[name][0])
+    need, shape = needs[most]
+    if step.accepted is not None:
+        own, _ = needs[step.accepted.term.choice.name]
+        if own >= MIN_NEED and need - own < MIN_NEED:
+            return step
+    free = max(needs_of_free_forms(smooth_force, columns).values())
+    if need < max(MIN_NEED, free - MIN_NEED):
+        return replace(step, accepted=None, tied_with=(), reason=step.reason or SMOOTH_FORCE)
+    before = search.losses(columns)
+    term = search.trial(ChosenTerm(choices[most], shape), columns, before)
+    others = [trial for trial in step.trials if trial.term.choice.name != most]
+    if term.at_end and not step.reason:
+        step = replace(step, trials=(term, *others), reason=END_OF_RANGE)
+    if term.at_end or term.gain <= 0.0:
+        return replace(step, accepted=None, tied_with=(), reason=step.reason or SMOOTH_FORCE)
+    tied = [name for name, (other, _) in needs.items() if name != most and need - other < TIED_NEED]
+    return replace(step, accepted=term, tied_with=tuple(tied), reason="")
 
 
 def _beside_another(

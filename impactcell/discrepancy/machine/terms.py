@@ -86,7 +86,7 @@ class Term:
     has_memory: bool = False
 
 
-SPEED_SHARES = (0.02, 0.04, 0.08, 0.15, 0.3)
+SPEED_SHARES = (0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3)
 """Stribeck velocities over the largest speed: slower than a tenth of it as a rule, and never all of it."""
 LENGTH_SHARES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
 """Presliding lengths over the range of positions: microns to a tenth of the stroke."""

@@ -10,6 +10,7 @@ from impactcell.discrepancy.machine.base_model import NumberPrior, TermChoice
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.regression import Blocks, out_of_fold_losses, roughness_penalty
 from impactcell.discrepancy.machine.rival_forms import KNOTS
+from impactcell.discrepancy.machine.smooth_force import SmoothForce
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.records import Samples
 
@@ -77,6 +78,9 @@ class TermSearch:
         Grid of each candidate by its name.
     priors : mapping
     nonnegative : frozenset of Column
+    smooth_force : SmoothForce, optional
+        Rows of these blocks beside a force of which nobody knows the form; without it any is named that
+        stands out.
     """
 
     blocks: Blocks
@@ -84,6 +88,7 @@ class TermSearch:
     shapes: Mapping[str, tuple[float, ...]]
     priors: Mapping[Column, NumberPrior]
     nonnegative: frozenset[Column]
+    smooth_force: SmoothForce | None = None
 
     def losses(self, columns: Sequence[Column]) -> Samples:
         """Out-of-fold squared residual of every block, shape (b,)."""
@@ -115,14 +120,17 @@ class TermSearch:
 
     def best_shape(self, choice: TermChoice, columns: Sequence[Column], before: Samples) -> Trial:
         """Try a candidate at every value of its shape."""
-        grid = self.shapes[choice.name]
-        trials = []
-        for shape in grid:
-            term = ChosenTerm(choice, shape)
-            gains = before - self.losses([*columns, *term.columns])
-            at_end = len(grid) > 1 and shape in (grid[0], grid[-1])
-            trials.append(Trial(term, gains, self.shares(gains, before), at_end))
+        trials = [
+            self.trial(ChosenTerm(choice, shape), columns, before) for shape in self.shapes[choice.name]
+        ]
         return max(trials, key=lambda trial: trial.gain)
+
+    def trial(self, term: ChosenTerm, columns: Sequence[Column], before: Samples) -> Trial:
+        """Try a candidate at one value of its shape."""
+        grid = self.shapes[term.choice.name]
+        gains = before - self.losses([*columns, *term.columns])
+        at_end = len(grid) > 1 and term.shape in (grid[0], grid[-1])
+        return Trial(term, gains, self.shares(gains, before), at_end)
 
 
 def mean_over_error(values: Samples) -> float:

@@ -20,7 +20,7 @@ from impactcell.discrepancy.machine.motion_scale import (
     is_told,
     motion_scale,
 )
-from impactcell.discrepancy.machine.rival_forms import Basis, free_columns, hats
+from impactcell.discrepancy.machine.rival_forms import Freedom, columns_of_corners
 from impactcell.discrepancy.machine.smoothing import bell, smoothed_speed, test_function, test_slope
 from impactcell.discrepancy.machine.step_forces import force_about
 from impactcell.discrepancy.machine.terms import MotionState, Term
@@ -79,7 +79,7 @@ def build_rows(
     base: BaseModel,
     shapes: Mapping[TermChoice, Sequence[float]],
     gravity_and_delay: tuple[float, float],
-    basis: Basis = hats,
+    freedom: Freedom = columns_of_corners,
 ) -> Rows:
     """Rows of all records with a column for every term, shape and nuisance.
 
@@ -92,11 +92,11 @@ def build_rows(
     gravity_and_delay : (float, float)
         G as it is known so far, by which load and zero of the position go, and how late the force was
         recorded.
-    basis : callable
-        Of the free forms.
+    freedom : callable
+        Gives columns beside those of nuisances and terms.
     """
     scale = motion_scale(records, base.response, gravity_and_delay[0])
-    parts = [_record_rows(record, base, shapes, gravity_and_delay, (scale, basis)) for record in records]
+    parts = [_record_rows(record, base, shapes, gravity_and_delay, (scale, freedom)) for record in records]
     return Rows(
         np.concatenate([part.target for part in parts]),
         {name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns},
@@ -112,10 +112,10 @@ def _record_rows(
     base: BaseModel,
     shapes: Mapping[TermChoice, Sequence[float]],
     gravity_and_delay: tuple[float, float],
-    scale_and_basis: tuple[MotionScale, Basis],
+    scale_and_freedom: tuple[MotionScale, Freedom],
 ) -> Rows:
     gravity, delay_s = gravity_and_delay
-    scale, basis = scale_and_basis
+    scale, freedom = scale_and_freedom
     step = record.step_s
     half, narrow = half_supports(record, scale)
     weight, curvature = test_function(half, step)
@@ -146,7 +146,7 @@ def _record_rows(
             for number, feature in enumerate(term.features(motion, shape)):
                 raw[choice.name, shape, number] = -direction * feature if term.is_friction else feature
     motion = MotionState(record.position, velocity, load, one)
-    raw |= free_columns(motion, direction, scale.ranges, basis)
+    raw |= freedom(motion, direction, scale.ranges)
     columns = {
         name: _averaged(values, pushing if name == GAIN else weight, centres) for name, values in raw.items()
     }

@@ -1,0 +1,55 @@
+"""How much records need a term, or a function in one place, beside a smooth force."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from impactcell.discrepancy.machine.base_model import TermChoice
+from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS
+from impactcell.discrepancy.machine.smooth_force import SmoothForce
+from impactcell.discrepancy.machine.trials import ChosenTerm
+from impactcell.discrepancy.machine.weak_form import Column
+
+MIN_NEED = 3.0
+"""Logarithm of how much likelier records have to be with a term than with a smooth force alone [1]."""
+TIED_NEED = 3.0
+"""Logarithm of how much likelier they are with the best term, up to which another one is tied with it [1]."""
+FREE_SIZES = (1.0, 0.1, 0.01)
+"""Sizes of the corners of a free form, over that at which one would explain all there is [1]."""
+
+
+def needs_of_terms(
+    smooth_force: SmoothForce,
+    columns: Sequence[Column],
+    choices: Sequence[TermChoice],
+    shapes: Mapping[str, Sequence[float]],
+) -> dict[str, tuple[float, float]]:
+    """By name of a term, how much likelier records are with it (logarithm), and the shape that they want.
+
+    Every value of its shape is as likely beforehand as the others.
+    """
+    without = smooth_force.evidence(columns)
+    needs = {}
+    for choice in choices:
+        grid = shapes[choice.name]
+        values = [
+            smooth_force.evidence(columns, ChosenTerm(choice, shape).columns) - without for shape in grid
+        ]
+        needs[choice.name] = _mean(values), grid[int(np.argmax(values))]
+    return needs
+
+
+def needs_of_free_forms(smooth_force: SmoothForce, columns: Sequence[Column]) -> dict[str, float]:
+    """By free form, how much likelier records are with it, at corners of some size (logarithm)."""
+    without = smooth_force.evidence(columns)
+    needs = {}
+    for form in FREE_FORMS:
+        corners = [(form, 0.0, number) for number in range(KNOTS)]
+        needs[form] = _mean([smooth_force.evidence(columns, corners, size) - without for size in FREE_SIZES])
+    return needs
+
+
+def _mean(logarithms: Sequence[float]) -> float:
+    """Logarithm of the mean of what logarithms are given of."""
+    return float(np.logaddexp.reduce(logarithms)) - math.log(len(logarithms))

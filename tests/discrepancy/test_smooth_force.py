@@ -1,0 +1,201 @@
+"""Evidence for a term beside a smooth force, by dense normal distributions, and what is named by it."""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from impactcell.campaign import Campaign, Excitation
+from impactcell.discrepancy.machine import (
+    BaseModel,
+    MachineFinding,
+    NumberPrior,
+    Response,
+    TermChoice,
+    investigate_machine,
+    smooth_force,
+)
+from impactcell.discrepancy.machine.law_refusal import NOT_IN_ONE_PLACE
+from impactcell.discrepancy.machine.selection import SMOOTH_FORCE
+from impactcell.discrepancy.machine.smooth_force import NAME, SmoothForce, smooth_force_columns
+from impactcell.discrepancy.machine.terms import MotionState
+from impactcell.discrepancy.machine.weak_form import Column, Rows
+from impactcell.records import Capture, Channel, Samples
+
+OFFSET, FREE, DRAG = ("offset", 0.0, 0), ("free", 0.0, 0), ("drag", 0.0, 0)
+RANGES = {"position": (-0.3, 0.7), "speed": (0.0, 2.0), "load": (0.0, 1.0)}
+Law = Callable[[Samples, Samples], Samples]
+
+
+def motion(position: Samples, velocity: Samples) -> MotionState:
+    nothing = np.zeros_like(position)
+    return MotionState(position, velocity, nothing, nothing)
+
+
+@pytest.mark.parametrize("length", smooth_force.LENGTHS)
+def test_the_waves_make_a_force_of_one_size_and_correlation_length(length: float) -> None:
+    """Squared exponential over half the ranges, away from the box, at which it is zero."""
+    rng = np.random.default_rng(3)
+    reach = smooth_force.BOX - 1.4 * length
+    x, u = rng.uniform(-reach, reach, (2, 40))
+    columns = smooth_force_columns(motion(0.2 + 0.5 * x, 2.0 * u), np.sign(u), RANGES)
+    waves = np.stack([values for name, values in columns.items() if name[0] == NAME], axis=1)
+    covariance = waves * smooth_force._spectrum(length) @ waves.T
+    square = np.subtract.outer(x, x) ** 2 + np.subtract.outer(u, u) ** 2
+    assert covariance == pytest.approx(np.exp(-0.5 * square / length**2), abs=0.06)
+
+
+def rows_of(target: Samples, columns: dict[Column, Samples], waves: Samples, sigma: float) -> Rows:
+    count = len(target)
+    every = columns | {(NAME, 0.0, number): wave for number, wave in enumerate(waves.T)}
+    nothing = np.zeros(count)
+    return Rows(target, every, nothing, np.arange(float(count)), np.full(count, sigma**2), nothing)
+
+
+def dense(target: Samples, columns: Sequence[tuple[Samples, float]], waves: Samples, sigma: float) -> float:
+    """The same by dense covariances s² (V + k² P P' + X D X'), s of the largest likelihood, at least 1."""
+    values = []
+    for length in smooth_force.LENGTHS:
+        shapes = waves * np.sqrt(smooth_force._spectrum(length))
+        shapes /= math.sqrt((shapes**2).sum() / sigma**2 / len(target))
+        for level in smooth_force.LEVELS:
+            covariance = sigma**2 * np.eye(len(target)) + level**2 * shapes @ shapes.T
+            for column, std in columns:
+                covariance += std**2 * np.outer(column, column)
+            left = float(target @ np.linalg.solve(covariance, target)) / len(target)
+            spread = max(left, 1.0)
+            values.append(multivariate_normal.logpdf(target, cov=spread * covariance))
+    return float(np.logaddexp.reduce(values)) - math.log(len(values))
+
+
+@pytest.mark.parametrize("strength", [0.0, 0.4, 4.0])
+def test_evidence_is_that_of_dense_normal_distributions(strength: float) -> None:
+    rng = np.random.default_rng(8)
+    count, sigma = 60, 0.3
+    x, u = rng.uniform(-1.0, 1.0, (2, count))
+    found = smooth_force_columns(motion(0.2 + 0.5 * x, 2.0 * u), np.sign(u), RANGES)
+    waves = np.stack([values for name, values in found.items() if name[0] == NAME], axis=1)
+    columns = {OFFSET: np.ones(count), FREE: x, DRAG: -u * np.abs(u)}
+    target = 0.7 + strength * columns[DRAG] + 0.5 * np.sin(2.0 * x + u) + sigma * rng.normal(size=count)
+    priors = {OFFSET: NumberPrior(0.0, 0.5), FREE: NumberPrior(0.0, math.inf)}
+    force = SmoothForce(
+        rows_of(target, columns, waves, sigma), np.ones(count, dtype=bool), count, priors, frozenset()
+    )
+    nuisances = np.stack([columns[OFFSET], columns[FREE]], axis=1)
+    left = target - nuisances @ np.linalg.lstsq(nuisances, target, rcond=None)[0]
+    size = math.sqrt(left @ left / (columns[DRAG] @ columns[DRAG]))
+    free = smooth_force.NUISANCE_STD * math.sqrt(target @ target / (x @ x))
+    base = [(columns[OFFSET], 0.5), (x, free)]
+    without = dense(target, base, waves, sigma)
+    for share in (1.0, 0.1):
+        expected = dense(target, [*base, (columns[DRAG], share * size)], waves, sigma) - without
+        own = force.evidence([OFFSET, FREE], [DRAG], share) - force.evidence([OFFSET, FREE])
+        assert own == pytest.approx(expected, abs=1e-6)
+
+
+def test_a_strength_that_may_not_be_negative() -> None:
+    """Of the term there is no evidence then; of a model's own it is as without that column."""
+    rng = np.random.default_rng(2)
+    count = 80
+    x, u = rng.uniform(-1.0, 1.0, (2, count))
+    found = smooth_force_columns(motion(0.2 + 0.5 * x, 2.0 * u), np.sign(u), RANGES)
+    waves = np.stack([values for name, values in found.items() if name[0] == NAME], axis=1)
+    columns = {OFFSET: np.ones(count), DRAG: -u * np.abs(u), FREE: np.sign(x) * u}
+    target = -3.0 * columns[DRAG] + columns[FREE] + 0.1 * rng.normal(size=count)
+    force = SmoothForce(
+        rows_of(target, columns, waves, 0.1),
+        np.ones(count, dtype=bool),
+        count,
+        {OFFSET: NumberPrior(0.0, math.inf)},
+        frozenset([DRAG]),
+    )
+    assert force.evidence([OFFSET], [DRAG]) == -math.inf
+    assert force.evidence([OFFSET, DRAG], [FREE]) == pytest.approx(force.evidence([OFFSET], [FREE]))
+
+
+SLIDE = BaseModel(
+    response=Response.FORCE,
+    inertia=NumberPrior(2.0, 0.1),
+    force_offset=NumberPrior(0.0, math.inf),
+    terms=(TermChoice("coulomb_friction"),),
+)
+
+
+def slide(law: Law, seed: int) -> Campaign:
+    """Six records of a slide that sums of three sines move, and what moves it in closed form."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(0.0, 12.0, 4e-3)
+    shots = []
+    for number in range(1, 7):
+        position, velocity, acceleration = np.zeros((3, time_s.size))
+        for _ in range(3):
+            rate, phase = 2.0 * np.pi * rng.uniform(0.3, 1.2), rng.uniform(0.0, 2.0 * np.pi)
+            size = 0.08 * rng.uniform(0.5, 1.0)
+            position += size * np.sin(rate * time_s + phase)
+            velocity += size * rate * np.cos(rate * time_s + phase)
+            acceleration -= size * rate**2 * np.sin(rate * time_s + phase)
+        force = 2.0 * acceleration + 3.0 * np.tanh(velocity / 1e-3) - law(position, velocity)
+        force += 0.2 * rng.standard_normal(time_s.size)
+        shots.append(
+            Capture(number, math.nan, math.nan, Channel(time_s, force, None), Channel(time_s, position, None))
+        )
+    return Campaign(Excitation.DRIVEN, tuple(shots))
+
+
+def wandering(position: Samples, velocity: Samples) -> Samples:
+    """Smooth force that no term has [N]."""
+    return 0.15 * (
+        np.sin(11.0 * position - 2.5 * velocity + 0.4)
+        + np.sin(-6.0 * position - 3.3 * velocity + 2.0)
+        + np.sin(13.0 * position + 1.1 * velocity + 4.0)
+    )
+
+
+@pytest.fixture(scope="module")
+def nothing_but_a_smooth_force() -> MachineFinding:
+    return investigate_machine(slide(wandering, 4), SLIDE)
+
+
+def test_a_smooth_force_alone_has_no_name_and_is_no_law(nothing_but_a_smooth_force: MachineFinding) -> None:
+    found = nothing_but_a_smooth_force
+    assert found.fall.before > 1.5
+    assert found.verdict == "unknown"
+    assert not found.established
+    assert found.law is None
+    assert found.law_refused == NOT_IN_ONE_PLACE
+
+
+def test_it_is_the_smooth_force_that_refuses_the_term_that_closes_most(
+    nothing_but_a_smooth_force: MachineFinding,
+) -> None:
+    step = nothing_but_a_smooth_force.steps[0]
+    assert step.reason == SMOOTH_FORCE
+    assert step.trials[0].z > 3.0
+
+
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [
+        ("viscous_friction", lambda q, v: -0.8 * v),
+        ("hardening_spring", lambda q, v: -180.0 * q**3),
+        ("stribeck_friction", lambda q, v: -1.5 * np.exp(-((v / 0.06) ** 2)) * np.sign(v)),
+    ],
+)
+def test_a_term_beside_a_smooth_force_is_named(name: str, law: Law) -> None:
+    found = investigate_machine(slide(lambda q, v: law(q, v) + wandering(q, v), 5), SLIDE)
+    assert found.established == (name,)
+    assert found.fall.after < found.fall.before
+
+
+def test_a_function_in_one_place_is_told_from_a_smooth_force() -> None:
+    """A bump of friction along the stroke is no term of the catalogue, and no smooth force."""
+
+    def bump(q: Samples, v: Samples) -> Samples:
+        return -1.5 * np.exp(-0.5 * ((q - 0.04) / 0.05) ** 2) * np.sign(v)
+
+    found = investigate_machine(slide(bump, 6), SLIDE)
+    assert not found.established
+    assert found.law is not None
+    assert found.law.place == "law_of_friction_over_position"
