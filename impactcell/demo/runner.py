@@ -19,7 +19,7 @@ from rich.live import Live
 
 from impactcell.demo.auto_teach import AutoTeach
 from impactcell.demo.scenario_setup import USER, DemoSetup, set_up_scenario
-from impactcell.demo.targets import targets_json, targets_table
+from impactcell.demo.targets import number, targets_json, targets_table
 from impactcell.demo.view import Scene, render
 from impactcell.errors import ImpactCellError
 from impactcell.positioning.task_state_machine import TaskOutcome
@@ -221,23 +221,23 @@ class _DemoRun:
             "cycles": self.seen,
             "missed": self.missed,
             "last_cycle": last.cycle,
-            "mu_s": _number(last.friction.mu_s.value),
-            "mu_s_std": _number(last.friction.mu_s.std),
-            "mu_k": _number(last.friction.mu_k.value),
+            "mu_s": number(last.friction.mu_s.value),
+            "mu_s_std": number(last.friction.mu_s.std),
+            "mu_k": number(last.friction.mu_k.value),
             "estimator": last.friction.estimator.value,
             "quality": last.friction.mu_s.quality.name.lower(),
             "wear": {
-                "level": _number(last.wear.level),
-                "level_std": _number(last.wear.level_std),
-                "level_common_std": _number(last.wear.level_common_std),
-                "rate_per_1000_cycles": _number(last.wear.rate_per_cycle * 1000),
-                "limit": _number(last.wear.limit),
-                "cycles_to_limit": _number(last.wear.cycles_to_limit),
+                "level": number(last.wear.level),
+                "level_std": number(last.wear.level_std),
+                "level_common_std": number(last.wear.level_common_std),
+                "rate_per_1000_cycles": number(last.wear.rate_per_cycle * 1000),
+                "limit": number(last.wear.limit),
+                "cycles_to_limit": number(last.wear.cycles_to_limit),
             },
             "batch": {
                 "id": last.batch.batch_id,
-                "offset": _number(last.batch.offset),
-                "last_shift": _number(last.batch.last_shift),
+                "offset": number(last.batch.offset),
+                "last_shift": number(last.batch.last_shift),
                 "last_shift_cycle": last.batch.last_shift_cycle,
             },
             **self._targets(),
@@ -292,7 +292,3 @@ def _print_line(_: _DemoRun, snapshot: Snapshot) -> None:
 
 def _draw_nothing(_: _DemoRun, __: Snapshot) -> None:
     """Draw nothing: the summary, if anything, is all that is asked for."""
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None

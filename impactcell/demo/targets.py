@@ -11,23 +11,25 @@ from impactcell.positioning.task_state_machine import TaskOutcome
 
 
 def targets_table(outcomes: Sequence[TaskOutcome], tolerance_m: float) -> Table:
-    """One row a part, in their order, and a row that sums up."""
+    """One row a part, in their order, and a row that sums up, but for ways that are not known."""
     table = Table(title="parts tapped to their targets", title_justify="left", header_style="dim", box=None)
     for heading in ("part", "mass", "from", "target", "taps", "off target", ""):
         table.add_column(heading, justify="left" if not heading else "right", no_wrap=bool(heading))
     for number, outcome in enumerate(outcomes, 1):
+        off_um = (outcome.position_m - outcome.target_m) * 1e6
         table.add_row(
             str(number),
             f"{outcome.mass_kg:.1f} kg",
             f"{outcome.start_m * 1e3:.3f} mm",
             f"{outcome.target_m * 1e3:.3f} mm",
             str(outcome.taps),
-            f"{(outcome.position_m - outcome.target_m) * 1e6:+.0f} µm",
+            f"{off_um:+.0f} µm" if math.isfinite(off_um) else "–",
             Text("inside", style="green") if outcome.settled else Text(outcome.reason, style="bold red"),
         )
     hits = sum(outcome.settled for outcome in outcomes)
     taps = sum(outcome.taps for outcome in outcomes)
-    travelled = math.fsum(abs(outcome.position_m - outcome.start_m) for outcome in outcomes)
+    ways_m = (abs(outcome.position_m - outcome.start_m) for outcome in outcomes)
+    travelled = math.fsum(way_m for way_m in ways_m if math.isfinite(way_m))
     table.add_section()
     table.add_row(
         "all", "", "", f"{travelled * 1e3:.1f} mm", str(taps), f"± {tolerance_m * 1e6:.0f} µm",
@@ -37,13 +39,13 @@ def targets_table(outcomes: Sequence[TaskOutcome], tolerance_m: float) -> Table:
 
 
 def targets_json(outcomes: Sequence[TaskOutcome]) -> list[dict[str, Any]]:
-    """One object a part, in their order."""
+    """One object a part, in their order; null where it is not known where the part lies."""
     return [
         {
             "target_mm": outcome.target_m * 1e3,
             "start_mm": outcome.start_m * 1e3,
-            "end_mm": outcome.position_m * 1e3,
-            "off_target_um": (outcome.position_m - outcome.target_m) * 1e6,
+            "end_mm": number(outcome.position_m * 1e3),
+            "off_target_um": number((outcome.position_m - outcome.target_m) * 1e6),
             "mass_kg": outcome.mass_kg,
             "taps": outcome.taps,
             "inside": outcome.settled,
@@ -51,3 +53,8 @@ def targets_json(outcomes: Sequence[TaskOutcome]) -> list[dict[str, Any]]:
         }
         for outcome in outcomes
     ]
+
+
+def number(value: float) -> float | None:
+    """Give a number that JSON has; None for one that is not known."""
+    return value if math.isfinite(value) else None

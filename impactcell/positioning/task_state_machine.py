@@ -246,18 +246,21 @@ def failed(sequence: TaskState, reason: str, evidence: Evidence | None = None) -
     """Stop with an alarm: link lost, command refused or not answered, or a tap that did not do its work."""
     if not sequence.running:
         return sequence
-    return replace(sequence, phase=TaskPhase.FAULTED, tap=None, reason=reason, evidence=evidence)
+    return _stopped(sequence, TaskPhase.FAULTED, reason, evidence)
 
 
 def aborted(sequence: TaskState, by: str) -> TaskState:
-    """Stop because a person or the PLC says so; not a fault.
-
-    An outstanding tap is to be cancelled; where it leaves the part is not known.
-    """
+    """Stop because a person or the PLC says so; not a fault. An outstanding tap is to be cancelled."""
     if not sequence.running:
         return sequence
-    position_m = math.nan if sequence.phase is TaskPhase.WAITING else sequence.position_m
-    return replace(sequence, phase=TaskPhase.IDLE, tap=None, reason=f"aborted by {by}", position_m=position_m)
+    return _stopped(sequence, TaskPhase.IDLE, f"aborted by {by}", None)
+
+
+def _stopped(sequence: TaskState, phase: TaskPhase, reason: str, evidence: Evidence | None) -> TaskState:
+    """End a task; where a tap that has been commanded and not observed leaves the part is not known."""
+    is_outstanding = sequence.phase is TaskPhase.WAITING and sequence.tap is not None
+    position_m = math.nan if is_outstanding else sequence.position_m
+    return replace(sequence, phase=phase, tap=None, reason=reason, evidence=evidence, position_m=position_m)
 
 
 def _plan(sequence: TaskState, cell: PositioningCell, planner: TapPlanner) -> TaskState:

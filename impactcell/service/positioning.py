@@ -73,7 +73,7 @@ class PositioningTask:
         self._begun_target: tuple[int, int] | None = None  # session and sequence of the one whose task runs
         self._at_rest = asyncio.Event()  # no tap is under way, also none that was aborted
         self._at_rest.set()
-        self._aborted_at_m = math.nan  # where the tap under way when its task was aborted has left the part
+        self._left_at_m = math.nan  # where the tap under way when its task was stopped has left the part
         self._batch_shift_cycle = worker.snapshot.batch.last_shift_cycle if worker.snapshot else 0
 
     @property
@@ -81,7 +81,7 @@ class PositioningTask:
         """The task as it is published."""
         published, task = self._sequence.published(), self._sequence
         if math.isnan(published.remaining_m):
-            published = replace(published, remaining_m=task.target_m - self._aborted_at_m)
+            published = replace(published, remaining_m=task.target_m - self._left_at_m)
         return replace(published, predictions=self._predictions)
 
     @property
@@ -256,12 +256,11 @@ class PositioningTask:
                 fault = str(error)
             finally:
                 self._at_rest.set()
-            if self._sequence is not waiting:  # what came of it is no other task's business
-                await self._show_where_aborted()
-                continue
-            if report is None:
+            if report is None and self._sequence is waiting:
                 self._set_sequence(task_state_machine.failed(waiting, fault))
-                return
+            if report is None or self._sequence is not waiting:  # what came of it is no other task's business
+                await self._show_where_left()
+                continue
             if self._plc_targets.is_another(report.target_sequence):
                 # Another part lies there by now: its position says nothing of the tap.
                 self._set_sequence(task_state_machine.aborted(waiting, BY_PLC))
@@ -274,12 +273,12 @@ class PositioningTask:
             if self._sequence is waiting:
                 self._set_sequence(after)
 
-    async def _show_where_aborted(self) -> None:
+    async def _show_where_left(self) -> None:
         """Publish where the part has come to rest, unless another task has begun meanwhile."""
         with contextlib.suppress(FieldbusError, PositioningError):  # then it is not known
             report = await self._positioner.read_report_at_rest()
             if not self._sequence.running:
-                self._aborted_at_m = report.position_m
+                self._left_at_m = report.position_m
                 self._changed()
 
     def _report(self) -> PositioningStatus:
@@ -296,5 +295,5 @@ class PositioningTask:
                 self.outcomes.append(now.outcome)
                 if self._begun_target is not None:
                     self._worker.handled_target, self._begun_target = self._begun_target, None
-            self._sequence, self._aborted_at_m = now, math.nan
+            self._sequence, self._left_at_m = now, math.nan
             self._changed()

@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 
 from rich.console import Console
 
@@ -29,6 +30,15 @@ def test_the_table_says_target_taps_and_distance_of_every_part() -> None:
     assert all(word in second for word in ("-800 µm", " 5 ", "moved nothing"))
     assert "1 of 2 inside, 4.0 taps a part" in lines[-1]
     assert "33.2 mm" in lines[-1]
+
+
+def test_where_a_part_lies_that_nobody_knows_is_no_number() -> None:
+    lost = TaskOutcome(0.030, 0.010, math.nan, 12.0, 1, settled=False, reason="press-1: link lost")
+    lines = printed((*OUTCOMES, lost)).splitlines()
+    assert "–" in next(line for line in lines if "30.000 mm" in line)
+    assert "33.2 mm" in lines[-1]
+    row = targets_json((lost,))[0]
+    assert (row["target_mm"], row["end_mm"], row["off_target_um"]) == (30.0, None, None)
 
 
 def test_no_part_has_a_table_too() -> None:

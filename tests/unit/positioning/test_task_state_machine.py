@@ -191,7 +191,18 @@ def test_a_lost_link_and_an_abort_at_any_moment() -> None:
 
 def test_no_position_is_a_fault() -> None:
     sequence, made = waiting()
-    assert observed(sequence, CELL, made, math.nan).phase is TaskPhase.FAULTED
+    stopped = observed(sequence, CELL, made, math.nan)
+    assert stopped.phase is TaskPhase.FAULTED
+    assert math.isnan(stopped.remaining_m)
+
+
+def test_a_fault_leaves_no_position_of_before_a_tap_that_may_have_moved_the_part() -> None:
+    sequence, made = waiting()
+    assert math.isnan(failed(sequence, "press 3: link lost").remaining_m)
+    commanding = begin_task(TaskState(), CELL, made, **GOOD)
+    assert failed(commanding, "press 3: refused").remaining_m == GOOD["target_m"] - GOOD["position_m"]
+    lies_at = sequence.position_m + 1e-6
+    assert observed(sequence, CELL, made, lies_at).remaining_m == sequence.target_m - lies_at
 
 
 @pytest.mark.parametrize(

@@ -153,6 +153,48 @@ async def test_what_remains_after_an_abort_is_not_known_where_the_module_does_no
     assert (task.state.running, task.fault) == (False, None)
 
 
+async def test_what_remains_after_a_fault_is_from_where_its_tap_has_left_the_part(
+    module: ToldModule, task: PositioningTask
+) -> None:
+    """It is not known until the module says where the part lies at rest."""
+    striker, driven = await with_a_tap_under_way(module, task, 0.02)
+    asked, answers = asyncio.Event(), asyncio.Event()
+
+    async def at_rest_later() -> PositioningStatus:
+        asked.set()
+        await answers.wait()
+        return await striker.read_report()
+
+    striker.read_report_at_rest = at_rest_later  # type: ignore[method-assign]
+    striker.fault = PositioningError("tap not finished within 10 s; the part may have been struck")
+    striker.goes_on.set()
+    await asked.wait()
+    assert task.fault is not None
+    assert math.isnan(task.state.remaining_m)
+    striker.position_m = 0.0035
+    striker.show()
+    answers.set()
+    await driven
+    assert task.state.remaining_m == pytest.approx(0.0165)
+    assert (task.state.running, task.fault[0]) == (False, str(striker.fault))
+
+
+async def test_what_remains_after_a_fault_is_not_known_where_the_module_does_not_say(
+    module: ToldModule, task: PositioningTask
+) -> None:
+    striker, driven = await with_a_tap_under_way(module, task, 0.02)
+
+    async def not_read() -> PositioningStatus:
+        raise PositioningError("the module has not been read for 10 s")
+
+    striker.read_report = striker.read_report_at_rest = not_read  # type: ignore[method-assign]
+    striker.goes_on.set()
+    await driven
+    assert striker.taps == 1
+    assert task.fault is not None
+    assert math.isnan(task.state.remaining_m)
+
+
 @pytest.mark.parametrize("abort_fault", [None, LinkError("no answer")])
 async def test_the_next_target_waits_until_the_tap_of_the_one_before_has_ended(
     module: ToldModule, task: PositioningTask, abort_fault: FieldbusError | None
