@@ -236,16 +236,14 @@ def transition(alarm: Alarm, event: AlarmEvent) -> Transition:
     if moved == alarm and not repeated:
         return Transition(alarm)
     is_raised = moved.active and not moved.acknowledged and (alarm.acknowledged or not alarm.active)
+    if moved.active and not alarm.active:  # what was said before was said of another activation
+        moved = replace(moved, comment="", user="")
     moved = _described(moved, event)
     if is_raised:
         moved = replace(moved, activation=max(event.time_ns, alarm.activation + 1))
     calls = moved.active and not moved.acknowledged and event.kind in (EventKind.ACTIVATE, EventKind.REALARM)
-    notifications = (
-        (Notification.EVENT, Notification.ANNUNCIATE)
-        if calls and not is_silenced(moved)
-        else (Notification.EVENT,)
-    )
-    return Transition(moved, notifications)
+    annunciated = (Notification.ANNUNCIATE,) if calls and not is_silenced(moved) else ()
+    return Transition(moved, (Notification.EVENT, *annunciated))
 
 
 def expire(alarm: Alarm, cycle: int, time_ns: int) -> Transition:

@@ -60,7 +60,8 @@ class Alarm:
         Tells the last activation from those before: its time, or more where that is not later; 0 before the
         first.
     comment, user : str
-        Who acted last, and the last comment of that person; empty where somebody else's came before.
+        Who acted last since the alarm became active, and the last comment of that person; empty where
+        somebody else's came before.
     """
 
     name: str

@@ -236,6 +236,18 @@ def test_nobody_is_told_to_have_said_what_somebody_else_said(
     assert (done.comment, done.user) == said
 
 
+def test_what_was_said_of_an_activation_does_not_stand_on_the_next():
+    """OPC UA Part 9, 5.5.2: a comment is of a certain state of the condition."""
+    raised = alarm(Annunciation.UNACKNOWLEDGED)
+    noted = transition(raised, AlarmEvent(EventKind.COMMENT, 9, 10, user="ann", comment="seen")).alarm
+    reminded = transition(noted, AlarmEvent(EventKind.REALARM, 10, 11)).alarm
+    assert (reminded.comment, reminded.user) == ("seen", "ann")
+    gone = transition(noted, AlarmEvent(EventKind.CLEAR, 11, 12)).alarm
+    assert (gone.comment, gone.user) == ("seen", "ann")
+    again = transition(gone, AlarmEvent(EventKind.ACTIVATE, 13, 14)).alarm
+    assert (again.comment, again.user) == ("", "")
+
+
 def test_realarm_calls_again():
     for state in (Annunciation.UNACKNOWLEDGED, Annunciation.ACKNOWLEDGED, Annunciation.CONFIRMED):
         done = transition(alarm(state), AlarmEvent(EventKind.REALARM))
