@@ -1,20 +1,17 @@
-"""One cycle of a cell, from what was measured to what is shown: `pipeline`, after `preprocessing`."""
+"""One cycle of a cell: `pipeline`, after `preprocessing`; `state` is what it keeps."""
 
 from impactcell.cell.model_change import in_place_of
 from impactcell.cell.pipeline import (
-    CellDesign,
-    CellState,
     StepResult,
     apply_event,
     apply_rule_result,
     expire_shelving,
-    initial_state,
-    migrate_state,
     reset_wear_level,
     start_batch,
     step,
 )
 from impactcell.cell.preprocessing import fill_defaults
+from impactcell.cell.state import CellDesign, CellState, initial_state, migrate_state
 
 __all__ = [
     "CellDesign",

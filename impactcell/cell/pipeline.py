@@ -11,30 +11,27 @@ people do to a condition; `start_batch` and `reset_wear_level` what they do to t
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from impactcell import alarms
 from impactcell.alarms import (
     AlarmEvent,
-    AlarmSetState,
-    AlarmSettings,
     CycleInputs,
     RuleResult,
     Transition,
 )
-from impactcell.cell.model_change import REPLACED, model_digest
 from impactcell.cell.preprocessing import (
     BatchNaming,
-    CaptureDefaults,
     OperatorBatch,
     assign_batch,
     degrade_quality,
     fill_defaults,
     update_period,
 )
+from impactcell.cell.state import CellDesign, CellState
 from impactcell.features import Fault, extract
 from impactcell.physics import free_motion
-from impactcell.prediction import Model, estimate_from_features
+from impactcell.prediction import estimate_from_features
 from impactcell.records import (
     Alarm,
     BatchAnnouncement,
@@ -47,64 +44,8 @@ from impactcell.records import (
 from impactcell.tracking import wear_batch
 from impactcell.tracking.model_gap import gap_cusum
 from impactcell.tracking.signature import tracker as signature
-from impactcell.tracking.signature.tracker import (
-    CycleConditions,
-    SignatureSettings,
-    SignatureState,
-)
-from impactcell.tracking.wear_batch import FrictionObservation, TrackerSettings, TrackerState, TrackingResult
-
-
-@dataclass(frozen=True, slots=True)
-class CellDesign:
-    """How one cell is computed; comes from its YAML and model file and does not change between cycles.
-
-    Attributes
-    ----------
-    defaults : CaptureDefaults
-        What holds where the module says nothing.
-    false_alarm_cycles : float
-        Designed mean number of cycles between two false alarms of one rule.
-    """
-
-    name: str
-    model: Model
-    tracker: TrackerSettings
-    signature: SignatureSettings
-    alarms: AlarmSettings
-    defaults: CaptureDefaults = field(default_factory=CaptureDefaults)
-    false_alarm_cycles: float = 100_000.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CellState:
-    """All that a cell keeps between cycles.
-
-    Attributes
-    ----------
-    cycle, time_ns : int
-        Of the last one.
-    period_s : float
-        Mean time between cycles, 0 before it is known.
-    grid : tuple
-        Length and points of the signature's grid.
-    model_digest : str
-        Of the model that the state was learned with; empty where that is not known.
-    model_changed : bool
-        Another model holds from the next cycle on.
-    """
-
-    tracker: TrackerState
-    signature: SignatureState
-    gap: gap_cusum.GapState
-    alarms: AlarmSetState
-    cycle: int = 0
-    time_ns: int = 0
-    period_s: float = 0.0
-    batch: BatchNaming = field(default_factory=BatchNaming)
-    grid: tuple[float, int] = (0.0, 0)
-    model_digest: str = ""
-    model_changed: bool = False
+from impactcell.tracking.signature.tracker import CycleConditions
+from impactcell.tracking.wear_batch import FrictionObservation, TrackingResult
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,41 +64,6 @@ class StepResult:
     snapshot: Snapshot
     changed: tuple[Alarm, ...]
     notes: tuple[str, ...]
-
-
-def initial_state(design: CellDesign) -> CellState:
-    """State of a cell that has seen nothing."""
-    return CellState(
-        TrackerState(),
-        signature.initial_state(design.signature),
-        gap_cusum.GapState(),
-        alarms.initial_state(design.alarms),
-        grid=_grid(design),
-        model_digest=model_digest(design.model),
-    )
-
-
-def migrate_state(design: CellDesign, state: CellState) -> CellState:
-    """Make a state fit the design: what is learned on another grid or by another model is learned anew.
-
-    Another model moves the estimates, as another batch would, and what residuals are usual: the next cycle is
-    an expected change, and says nothing of the material. Wear learned by a provisional model is learned anew,
-    and so is wear where one comes into service: its friction, and how that scatters, are another's.
-    """
-    if state.grid != _grid(design):
-        state = replace(state, signature=signature.initial_state(design.signature), grid=_grid(design))
-    digest = model_digest(design.model)
-    if state.model_digest == digest:
-        return state
-    has_changed, model = bool(state.model_digest), design.model
-    if has_changed and (model.is_provisional or model.provenance.get(REPLACED) == state.model_digest):
-        state = replace(state, tracker=TrackerState(clock=state.tracker.clock))
-    gap = gap_cusum.GapState() if has_changed else state.gap
-    return replace(state, gap=gap, model_digest=digest, model_changed=state.model_changed or has_changed)
-
-
-def _grid(design: CellDesign) -> tuple[float, int]:
-    return design.signature.length_m, design.signature.points
 
 
 def step(
@@ -277,9 +183,12 @@ def reset_wear_level(state: CellState, time_ns: int) -> CellState:
 
     Alarms of wear end at `time_ns`. How cycles vary about what is usual is kept.
     """
-    tracker, usual = wear_batch.reset_wear_level(state.tracker), signature.restart(state.signature)
-    alarm_state = alarms.end_surface(state.alarms, state.cycle, time_ns)
-    return replace(state, tracker=tracker, signature=usual, alarms=alarm_state)
+    return replace(
+        state,
+        tracker=wear_batch.reset_wear_level(state.tracker),
+        signature=signature.restart(state.signature),
+        alarms=alarms.end_surface(state.alarms, state.cycle, time_ns),
+    )
 
 
 def _of_session(state: CellState, capture: Capture) -> BatchNaming:
