@@ -77,12 +77,13 @@ def initial_state(design: CellDesign) -> CellState:
     )
 
 
-def migrate_state(design: CellDesign, state: CellState) -> CellState:
+def migrate_state(design: CellDesign, state: CellState, time_ns: int) -> CellState:
     """Make a state fit the design: what is learned on another grid or by another model is learned anew.
 
     Another model moves the estimates, as another batch would, and what residuals are usual: the next cycle is
     an expected change, and says nothing of the material. Wear learned by a provisional model is learned anew,
-    and so is wear where one comes into service: its friction, and how that scatters, are another's.
+    and so is wear where one comes into service: its friction, and how that scatters, are another's. What was
+    told of it ends at `time_ns`.
     """
     if state.grid != _grid(design):
         state = replace(state, signature=signature.initial_state(design.signature), grid=_grid(design))
@@ -92,7 +93,8 @@ def migrate_state(design: CellDesign, state: CellState) -> CellState:
         return state
     has_changed = bool(state.model_digest)
     if has_changed and (model.is_provisional or model.provenance.get(REPLACED) == state.model_digest):
-        state = replace(state, tracker=TrackerState(clock=state.tracker.clock))
+        told = alarms.end_surface(state.alarms, state.cycle, time_ns)
+        state = replace(state, tracker=TrackerState(clock=state.tracker.clock), alarms=told)
     gap = gap_cusum.GapState() if has_changed else state.gap
     return replace(state, gap=gap, model_digest=digest, model_changed=state.model_changed or has_changed)
 

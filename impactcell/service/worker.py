@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -69,13 +70,13 @@ class CellWorker:
         self._unknown = Unknown()
         """Alarms of another version that are kept for it."""
         restored = restored_state(self._journal_writer, design, self._unknown)
-        self._state = self._fitted(design, restored.cell)
-        self._snapshot = restored.snapshot
+        self._state, self._snapshot = restored.cell, restored.snapshot
         self.belief = restored.planner
         self.handled_target = restored.handled_target
         """Session and sequence of the PLC's last target whose task has ended; `record` stores it."""
         self.last = restored.last
         """The last cycle taken in, durable or not; None: none ever."""
+        self._fit_state()
         self._told = self.alarms
         self._tell_alarms: Callable[[tuple[Alarm, ...]], object] | None = None
         self._store_model()
@@ -186,7 +187,7 @@ class CellWorker:
 
         def swap() -> None:
             self._design = design
-            self._state = self._fitted(design, self._state)
+            self._fit_state()
             self._store_model()
 
         await self.run(swap)
@@ -222,25 +223,19 @@ class CellWorker:
         """Write the model beside the captures it was used on: the discrepancy workflow starts from it."""
         self._journal_writer.store_model(MODEL.dumps(self._design.model))
 
-    def _fitted(self, design: CellDesign, state: CellState) -> CellState:
+    def _fit_state(self) -> None:
         """Make the state fit the design; what that costs is told, here and by the signature's quality."""
-        fitted = core.migrate_state(design, state)
+        state = self._state
+        fitted = core.migrate_state(self._design, state, time.time_ns())
         if fitted.signature is not state.signature:
             self.log.warning("the grid of the signature was changed: the signature is learned anew")
         if fitted.tracker is not state.tracker:
-            is_guess = design.model.is_provisional
+            is_guess = self._design.model.is_provisional
             what = "a provisional model is in service" if is_guess else "the provisional model was replaced"
             self.log.warning("%s: wear and batches are learned anew", what)
-        return fitted
-
-    def _step(
-        self,
-        capture: Capture,
-        positioning: PositioningState,
-        announcement: BatchAnnouncement | None,
-        faults: tuple[str, ...],
-    ) -> StepResult:
-        return guarded_step(self.log, self._design, self._state, capture, positioning, announcement, faults)
+        if fitted.alarms is not state.alarms:
+            self._record(fitted)
+        self._state = fitted
 
     def _process(
         self,
@@ -249,7 +244,9 @@ class CellWorker:
         announcement: BatchAnnouncement | None,
         faults: tuple[str, ...],
     ) -> CycleResult:
-        step_result = self._step(capture, positioning, announcement, faults)
+        step_result = guarded_step(
+            self.log, self._design, self._state, capture, positioning, announcement, faults
+        )
         state, snapshot = step_result.state, step_result.snapshot
         last = CycleId(capture.session, capture.cycle)
         is_kept = self._journal_writer.journal is not None

@@ -92,7 +92,7 @@ def test_an_effect_and_the_model_that_takes_it_over(batch_id: str | None) -> Non
     assert [(name, active) for _, name, active in appeared] == [("ModelGap", True)]
     plant = replace(cell.design.model.plant, effects=VISCOUS | STRIBECK)
     cell.design = replace(cell.design, model=replace(cell.design.model, plant=plant, name="extended"))
-    cell.state = core.migrate_state(cell.design, cell.state)
+    cell.state = core.migrate_state(cell.design, cell.state, 0)
     assert cell.state.model_changed
     level = cell.state.tracker.filter.mean[0] if cell.state.tracker.filter is not None else None
     after = cell.run(32, effects=VISCOUS | STRIBECK)
@@ -105,4 +105,4 @@ def test_an_effect_and_the_model_that_takes_it_over(batch_id: str | None) -> Non
 
 
 def test_the_same_model_again_is_no_change(watching: Cell) -> None:
-    assert core.migrate_state(watching.design, watching.state) is watching.state
+    assert core.migrate_state(watching.design, watching.state, 0) is watching.state

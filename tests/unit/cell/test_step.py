@@ -220,14 +220,14 @@ def test_what_happens_beside_the_cycles_carries_the_cycle_and_its_own_time(
 
 def test_a_state_of_another_grid_learns_its_signature_anew(design: CellDesign, learned: CellState) -> None:
     wider = replace(design, signature=replace(design.signature, points=40))
-    fitted = core.migrate_state(wider, learned)
+    fitted = core.migrate_state(wider, learned, 99 * SECOND)
     assert len(fitted.signature.reference.mean) != len(learned.signature.reference.mean) or not np.any(
         fitted.signature.reference.mean
     )
     assert fitted.tracker is learned.tracker
     assert fitted.gap is learned.gap
     assert not fitted.model_changed
-    assert core.migrate_state(wider, fitted) is fitted
+    assert core.migrate_state(wider, fitted, 99 * SECOND) is fitted
     done = core.step(wider, fitted, capture(LEARNED + 1), PositioningState())
     assert len(done.snapshot.signature.friction) == 40
 
@@ -238,24 +238,47 @@ def test_what_was_learned_by_a_provisional_model_is_learned_anew_and_only_once(
     """The level of friction by a guessed model stayed the wear level for good, and the true one an offset."""
     guessed = replace(design.model, provenance={PROVISIONAL: "nothing measured"})
     begun = replace(learned, model_digest=model_digest(guessed))
-    assert core.migrate_state(replace(design, model=guessed), begun) is begun
+    assert core.migrate_state(replace(design, model=guessed), begun, 99 * SECOND) is begun
     fitted = replace(design, model=in_place_of(guessed, design.model))
-    anew = core.migrate_state(fitted, begun)
+    anew = core.migrate_state(fitted, begun, 99 * SECOND)
     assert anew.model_changed
     assert anew.tracker.bank.size == 0
     assert anew.tracker.clock == begun.tracker.clock
     assert anew.batch == begun.batch
     stepped = core.step(fitted, anew, capture(LEARNED + 1, mu_s=0.24), PositioningState())
     assert stepped.snapshot.wear.level == pytest.approx(0.24, abs=0.01)
-    assert core.migrate_state(fitted, stepped.state) is stepped.state
+    assert core.migrate_state(fitted, stepped.state, 99 * SECOND) is stepped.state
     # who calibrates or extends the model afterwards loses nothing, nor does who never had a provisional one
     for model in (replace(fitted.model, name="calibrated"), in_place_of(fitted.model, design.model)):
         assert (
-            core.migrate_state(replace(design, model=model), stepped.state).tracker is stepped.state.tracker
+            core.migrate_state(replace(design, model=model), stepped.state, 99 * SECOND).tracker
+            is stepped.state.tracker
         )
     assert in_place_of(design.model, guessed) is guessed
     assert in_place_of(guessed, guessed) is guessed
     assert in_place_of(design.model, design.model) is design.model
+
+
+def test_wear_that_a_provisional_model_told_of_ends_with_it(design: CellDesign, learned: CellState) -> None:
+    """Since when the surface was worn was told of the guess, to which the next model has no part."""
+    guessed = replace(design.model, provenance={PROVISIONAL: "nothing measured"})
+    worn = replace(design, model=guessed, tracker=replace(design.tracker, wear_limit=0.15))
+    state = replace(learned, model_digest=model_digest(guessed))
+    for cycle in range(LEARNED + 1, LEARNED + 12):
+        state = core.step(worn, state, capture(cycle), PositioningState()).state
+    assert state.alarms.alarm("WearLimit").active
+    kept = core.migrate_state(replace(worn, model=design.model), state, 99 * SECOND)
+    assert kept.alarms.alarm("WearLimit").active, "what was learned holds on, and what was told of it"
+    fitted = replace(worn, model=in_place_of(guessed, design.model))
+    state = core.migrate_state(fitted, state, 99 * SECOND)
+    ended = state.alarms.alarm("WearLimit")
+    assert (ended.active, ended.acknowledged, ended.time_ns) == (False, False, 99 * SECOND)
+    began = state.cycle + 1
+    for cycle in range(began, began + 40):
+        state = core.step(fitted, state, capture(cycle), PositioningState()).state
+    again = state.alarms.alarm("WearLimit")
+    assert again.active
+    assert again.evidence.change_cycle >= began
 
 
 def test_a_provisional_model_that_comes_back_finds_no_change_of_the_material(design: CellDesign) -> None:
@@ -274,29 +297,29 @@ def test_a_provisional_model_that_comes_back_finds_no_change_of_the_material(des
     plant = replace(design.model.plant, stiffness_n_per_m=5.2e5)
     guessed = replace(design.model, plant=plant, provenance={PROVISIONAL: "nothing measured"})
     restored = replace(design, model=guessed)
-    state = core.migrate_state(restored, state)
+    state = core.migrate_state(restored, state, 99 * SECOND)
     called = []
     for cycle in range(61, 121):
         done = core.step(restored, state, struck(cycle), PositioningState())
         state = done.state
         called += [alarm.name for alarm in done.changed if alarm.active]
     assert "BatchShift" not in called
-    back = core.migrate_state(replace(design, model=in_place_of(guessed, design.model)), state)
+    back = core.migrate_state(replace(design, model=in_place_of(guessed, design.model)), state, 99 * SECOND)
     assert back.tracker.bank.size == 0, "what is learned by a guess is no use to the model before either"
 
 
 def test_another_model_is_an_expected_change_of_one_cycle(design: CellDesign, learned: CellState) -> None:
     plant = replace(design.model.plant, stiffness_n_per_m=6.6e5)
     other = replace(design, model=replace(design.model, plant=plant))
-    changed = core.migrate_state(other, learned)
+    changed = core.migrate_state(other, learned, 99 * SECOND)
     assert changed.model_changed
     assert changed.gap.count == 0
     assert changed.tracker is learned.tracker
     done = core.step(other, changed, capture(LEARNED + 1), PositioningState())
     assert not done.state.model_changed
     assert done.state.alarms.alarm("BatchShift").suppressed
-    assert core.migrate_state(other, done.state) is done.state
+    assert core.migrate_state(other, done.state, 99 * SECOND) is done.state
     # two changes between two cycles are one
-    assert core.migrate_state(design, changed).model_changed
+    assert core.migrate_state(design, changed, 99 * SECOND).model_changed
     # a state that does not know by what model it was learned is not taken for another's
-    assert not core.migrate_state(other, replace(learned, model_digest="")).model_changed
+    assert not core.migrate_state(other, replace(learned, model_digest=""), 99 * SECOND).model_changed

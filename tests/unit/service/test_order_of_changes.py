@@ -7,6 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -97,7 +98,9 @@ def named(alarms: tuple[Alarm, ...]) -> Alarm:
 
 
 @pytest.fixture
-async def running(cell: CellConfig) -> Callable[[], tuple[CellTask, Thread, World]]:
+async def running(
+    cell: CellConfig, monkeypatch: pytest.MonkeyPatch
+) -> Callable[[], tuple[CellTask, Thread, World]]:
     """Make cells with a shelved alarm, each with a thread of its own that stands still."""
 
     def make() -> tuple[CellTask, Thread, World]:
@@ -106,8 +109,8 @@ async def running(cell: CellConfig) -> Callable[[], tuple[CellTask, Thread, Worl
         task.worker._thread = thread
         task._positioning = SimpleNamespace(state=PositioningState(), update_friction=lambda _snapshot: None)
 
-        def step(capture: object, positioning: PositioningState, *_: object) -> StepResult:
-            state = task.worker._state
+        def step(*given: Any) -> StepResult:
+            _log, _design, state, capture, positioning, *_ = given
             state, _done = core.apply_event(state, ALARM, AlarmEvent(EventKind.COMMENT, comment="a cycle"))
             snapshot = replace(
                 make_snapshot(capture, 0.2), positioning=positioning, alarms=state.alarms.alarms
@@ -116,7 +119,7 @@ async def running(cell: CellConfig) -> Callable[[], tuple[CellTask, Thread, Worl
 
         async def acknowledge(_cycle: object) -> None: ...
 
-        task.worker._step = step
+        monkeypatch.setattr("impactcell.service.worker.guarded_step", step)
         task._module.acknowledge = acknowledge
         for event in (EventKind.ACTIVATE, EventKind.SHELVE_TIMED):
             occurrence = AlarmEvent(event, time_ns=1, shelve_ns=10**18)

@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 
 from impactcell import cell as core
-from impactcell.alarms import AlarmEvent, EventKind
+from impactcell.alarms import AlarmEvent, EventKind, Message, RuleResult
 from impactcell.alarms.rules import module_connection
 from impactcell.errors import ForeignJournalError, JournalFullError
 from impactcell.journal.audit_entries import AuditEntry
+from impactcell.journal.history import HistoryQuery
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
+from impactcell.prediction import PROVISIONAL
 from impactcell.records import Alarm, Capture, Channel, CycleId, PositioningState, Quality, Shelving
 from impactcell.serialization.message_pack import pack_tree, unpack_tree
 from impactcell.service.factory import cell_design
@@ -212,6 +214,29 @@ async def test_a_signature_on_another_grid_is_learned_anew(
     assert caplog.text.count("the signature is learned anew") == 2
     await process(again, make_capture(3))
     await again.close()
+
+
+@pytest.mark.parametrize("restarted", [False, True])
+async def test_wear_that_a_provisional_model_told_of_ends_with_it_and_is_in_the_history(
+    tmp_path: Path, design: core.CellDesign, *, restarted: bool
+) -> None:
+    guessed = replace(design.model, provenance={PROVISIONAL: "nothing measured"})
+    worker = CellWorker(replace(design, model=guessed), Journal(tmp_path / "j", "c"), Retention())
+    worn = RuleResult("WearLimit", holds=True, message=Message("worn", "verschlissen"))
+    for _ in range(6):
+        await worker.apply_rule_result(worn, 10**18)
+    fitted = replace(design, model=core.in_place_of(guessed, design.model))
+    if restarted:
+        await worker.close()
+        worker = CellWorker(fitted, Journal(tmp_path / "j", "c"), Retention())
+    else:
+        await worker.redesign(fitted)
+    (now,) = (alarm for alarm in worker.alarms if alarm.name == "WearLimit")
+    await worker.close()
+    with Journal(tmp_path / "j", None, read_only=True) as journal:
+        history = [alarm for alarm in journal.alarms(HistoryQuery()).entries if alarm.name == "WearLimit"]
+    assert [alarm.active for alarm in history] == [True, False]
+    assert history[-1].time_ns == now.time_ns > 10**18
 
 
 async def test_alarms_of_another_version_are_told_and_kept_for_it(
