@@ -276,22 +276,43 @@ def test_a_law_of_powers_can_be_computed_from_what_is_told_of_it() -> None:
     assert [(row["words"], row["unit"]) for row in rows] == [("Amplitude", "N"), ("Bezugswert", "m/s")]
 
 
-def test_shapes_of_a_law_have_units_and_no_reference_that_it_has_not() -> None:
-    finding = with_law_of("force_over_position", "1")
+def parameters_of(finding: MachineFinding, form: LawForm) -> dict[str, Any]:
+    """Parameters that are written where a finding's law is of another form, with amplitudes of no account."""
     assert finding.law is not None
     assert finding.law.choice is not None
+    choice = replace(finding.law.choice, law=form)
+    columns = ChosenTerm(choice, 0.0).columns
+    size = np.ones(len(columns))
+    fit = LinearFit(columns, size, size, size, np.zeros(len(columns), dtype=bool))
+    law = replace(finding.law, choice=choice, model=replace(finding.law.model, fit=fit))
+    parameters: dict[str, Any] = machine_result.machine_document(replace(finding, law=law))["law"][
+        "parameters"
+    ]
+    return parameters
+
+
+def test_shapes_of_a_law_have_units_and_no_reference_that_it_has_not() -> None:
+    finding = with_law_of("force_over_position", "1")
     [power, decay] = [atom for atom in ATOMS if atom.name in ("u^n", "1/(1+u/l)")]
     for atom, shapes, told in (
         (power, (1.5,), {"exponent": (1.5, "1"), "reference": (0.2, "m")}),
         (decay, (0.03,), {"scale": (0.03, "m")}),
     ):
-        form = LawForm((Shaped((atom,), (shapes,)),), 0.2)
-        choice = replace(finding.law.choice, law=form)
-        fit = replace(finding.law.model.fit, columns=ChosenTerm(choice, 0.0).columns)
-        law = replace(finding.law, choice=choice, model=replace(finding.law.model, fit=fit))
-        document = machine_result.machine_document(replace(finding, law=law))
-        _, *shown = document["law"]["parameters"].items()
-        assert {name: (item["value"], item["unit"]) for name, item in shown} == told
+        shown = parameters_of(finding, LawForm((Shaped((atom,), (shapes,)),), 0.2))
+        assert {n: (item["value"], item["unit"]) for n, item in shown.items() if "amplitude" not in n} == told
+
+
+def test_no_shape_of_a_law_takes_the_name_of_another() -> None:
+    """The second term's second scale stood in place of its first, which was lost."""
+    finding = with_law_of("force_over_position", "1")
+    [decay, step] = [atom for atom in ATOMS if atom.name in ("1/(1+u/l)", "tanh(u/l)")]
+    both = (decay, step)
+    form = LawForm((Shaped(both, ((0.03,), (0.04,))), Shaped(both, ((0.05,), (0.06,)))), 0.2)
+    shown = parameters_of(finding, form)
+    told = {name: item["value"] for name, item in shown.items() if "amplitude" not in name}
+    assert told == {"scale": 0.03, "scale_2": 0.04, "scale_3": 0.05, "scale_4": 0.06}
+    rows = parameter_rows((("", shown),), Coordinate.TRANSLATION, "de")
+    assert len({row["words"] for row in rows}) == len(shown)
 
 
 def test_that_intervals_do_not_include_what_remains_is_german_too() -> None:

@@ -7,7 +7,7 @@ from impactcell.discrepancy.laws.free_rivals import hold_against_free_forms
 from impactcell.discrepancy.laws.free_term import FreeTerm, fit_free_terms
 from impactcell.discrepancy.laws.grammar import ATOMS, Atom, Shaped
 from impactcell.discrepancy.laws.grammar import name as form_name
-from impactcell.discrepancy.laws.law import Law
+from impactcell.discrepancy.laws.law import Law, shape_names
 from impactcell.discrepancy.laws.refit import FittedLaw
 from impactcell.discrepancy.laws.remainder import estimate_effects
 from impactcell.discrepancy.laws.tangent import Tangent
@@ -31,4 +31,5 @@ __all__ = [
     "form_name",
     "hold_against_free_forms",
     "rank_forms",
+    "shape_names",
 ]

@@ -204,10 +204,11 @@ class _OfCovariate:
 
 def _shape_name(shape: Shape, unit: str, taken: set[str]) -> str:
     suffix = SUFFIX[unit] if shape.has_unit else ""
-    return next(candidate for candidate in _numbered(shape.name, suffix) if candidate not in taken)
+    return next(candidate for candidate in shape_names(shape.name, suffix) if candidate not in taken)
 
 
-def _numbered(stem: str, suffix: str) -> Iterator[str]:
+def shape_names(stem: str, suffix: str = "") -> Iterator[str]:
+    """Give names for shapes of one name, in their order: the first has no number."""
     yield stem + suffix
     for number in range(2, 9):
         yield f"{stem}_{number}{suffix}"

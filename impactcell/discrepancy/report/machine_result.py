@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from impactcell.discrepancy.laws import shape_names
 from impactcell.discrepancy.machine import (
     ECCENTRICITY,
     FREE_FORMS,
@@ -157,10 +158,10 @@ def _law_parameters(finding: MachineFinding, chosen: ChosenTerm) -> dict[str, An
         place = model.fit.columns.index(column)
         told = parameter_name(name, unit, finding.base.coordinate)
         document[told] = _estimate(model, place) | {"unit": force}
-    for number, item in enumerate(law.terms, 1):
+    for item in law.terms:
         for atom, values in zip(item.term, item.shapes, strict=True):
             for shape, value in zip(atom.shapes, values, strict=True):
-                name = shape.name if f"{shape.name}" not in document else f"{shape.name}_{number}"
+                name = next(name for name in shape_names(shape.name) if name not in document)
                 document[name] = _held(value, of_covariate if shape.has_unit else "1")
     return document | ({"reference": _held(law.reference, of_covariate)} if law.has_reference else {})
 
