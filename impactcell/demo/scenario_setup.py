@@ -148,7 +148,7 @@ def story(content: dict) -> tuple[tuple[int, str], ...]:  # type: ignore[type-ar
         if batch["from_cycle"] > 1
     ]
     events += [
-        (deviation["cycle"], f"cycle {deviation['cycle']} is odd: a {deviation['kind']} along its stroke")
+        (deviation["cycle"], f"cycle {deviation['cycle']} is odd: a {deviation['kind']} along its slide")
         for deviation in content.get("deviations", [])
     ]
     events += [

@@ -75,8 +75,8 @@ def tour(content: Mapping[str, Any]) -> tuple[TourStop, ...]:
     for deviation in content.get("deviations", []):
         kind = deviation["kind"]
         what = Message(
-            f"One cycle is odd: a {kind} along its way.",
-            f"Ein Zyklus ist anders: {KINDS[kind]} entlang seines Wegs.",
+            f"One cycle is odd: a {kind} along its slide.",
+            f"Ein Zyklus ist anders: {KINDS[kind]} entlang seines Gleitwegs.",
         )
         stops.append(TourStop(deviation["cycle"], what, DEVIATION))
     for entry in content.get("appearances", []):

@@ -12,6 +12,7 @@ from impactcell.demo.tour import tour
 from impactcell.process.shipped import ROOT, shipped_config
 from impactcell.scada import Role
 from impactcell.web.interface import TourStop
+from impactcell.web.texts.pages import PAGE_TEXTS
 from tests.unit.web.page import CELL, make_page
 
 
@@ -25,6 +26,15 @@ def test_what_happens_is_told_with_where_to_look(scenario: str) -> None:
         for said in (stop.what, stop.where):
             assert said.english
             assert said.german not in ("", said.english)
+
+
+def test_summary_tour_and_page_call_the_way_of_an_odd_cycle_alike() -> None:
+    content = {"deviations": [{"cycle": 40, "kind": "bump"}]}
+    [(_, said)], told = story(content), tour(content)[0].what
+    english, german = (words.split()[-1] for words in PAGE_TEXTS["signature"])
+    assert said.endswith(f" a bump along its {english}")
+    assert told.english.endswith(f" a bump along its {english}.")
+    assert told.german.endswith(f" entlang seines {german}.")
 
 
 async def test_the_page_gives_the_tour(tmp_path: Path) -> None:
