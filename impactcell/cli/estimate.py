@@ -12,6 +12,7 @@ from typing import TextIO
 
 from impactcell.api.friction import calibrated_where_possible, with_masses
 from impactcell.campaign import Campaign, Excitation, from_contact, naming, read
+from impactcell.cli.direction_note import note_of_direction
 from impactcell.cli.free_slides import estimate_free_slides, no_estimate
 from impactcell.cli.paths import check_output
 from impactcell.discrepancy.data import (
@@ -88,6 +89,8 @@ def estimate(
     else:
         taps = with_masses([extract(shot) for shot in campaign_data.shots])
         rows = _of_taps(campaign_data, taps, cell)
+    if note := note_of_direction(campaign_data, {number: row.mu_k.value for number, row in rows}):
+        print_note(note)
     rows += [(number, no_estimate(told, told)) for number, told in unlike.items()]
     rows.sort(key=lambda row: order.index(row[0]))
     if as_json:

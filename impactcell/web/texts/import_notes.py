@@ -1,4 +1,7 @@
-"""What `impactcell import` noted of dropped files, as the page says it: without its options."""
+"""What `impactcell import` noted of dropped files, and `estimate` of their shots, as the page says it.
+
+Options of the command line are left out.
+"""
 
 import re
 from typing import Final
@@ -69,6 +72,11 @@ GERMAN: Final = {
     r"no position was recorded: such taps tell mu_s by peak force and the model of a cell, .*":
         "keine Position aufgezeichnet: solche Stöße zeigen mu_s an der Spitzenkraft und mit dem Modell einer "
         "Zelle, von sich aus keines",
+    r"mu_k goes with direction: (.+) in (\d+) shots along \+1, (.+) in (\d+) shots along -1: friction "
+    r"differs by direction, or the surface is not level; a mean of both is that of neither":
+        r"µk hängt von der Richtung ab: \1 in \2 Aufzeichnungen in Richtung +1, \3 in \4 in Richtung -1: die "
+        "Reibung ist richtungsabhängig, oder die Fläche liegt nicht waagrecht; ein Mittel über beide ist "
+        "keines von beiden",
     r"named '(.+)', unit fits": r"heißt „\1“, Einheit passt",
     r"named '(.+)'": r"heißt „\1“",
     r"the only column in (\S+)": r"einzige Spalte in \1",

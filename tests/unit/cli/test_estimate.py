@@ -13,9 +13,11 @@ import pytest
 
 from impactcell.campaign import Campaign, Excitation, Sensor, write
 from impactcell.campaign import read as read_campaign
+from impactcell.cli.direction_note import note_of_direction
 from impactcell.cli.estimate import COLUMNS, estimate
 from impactcell.errors import CampaignError, PredictionError
 from impactcell.records import Capture, Channel
+from impactcell.web.texts.import_notes import page_note
 from impactcell.web.texts.reasons import german_reason
 from tests.taps import Tap
 
@@ -73,6 +75,55 @@ def test_the_plant_is_fitted_and_every_shot_estimated(
     captured = capsys.readouterr()
     assert captured.out == ""
     assert "plant fitted to 16 of 16 shots" in captured.err
+
+
+def by_direction(asymmetry: float) -> list[Capture]:
+    """Taps whose friction is larger along +1, by that share."""
+    rng = np.random.default_rng(11)
+    scatter = 1.0 + 0.01 * rng.standard_normal(12)
+    signs = [1, -1] * 6
+    return captures([
+        Tap(0.06, 0.2 * (1.0 + asymmetry * sign) * factor, stroke_m=1.5e-3, direction=sign, effects={})
+        for factor, sign in zip(scatter, signs, strict=True)
+    ])  # fmt: skip
+
+
+DIRECTION = re.compile(
+    r"mu_k goes with direction: (\S+) ± (\S+) in 6 shots along \+1, (\S+) ± (\S+) in 6 shots along -1: .*"
+)
+
+
+def test_mu_k_that_goes_with_direction_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    estimate(campaign(tmp_path / "c", by_direction(0.05)), None, tmp_path / "o.csv")
+    (note,) = [line for line in capsys.readouterr().err.splitlines() if "direction" in line]
+    told = DIRECTION.fullmatch(note)
+    assert told is not None
+    forward, _, backward, _ = map(float, told.groups())
+    assert forward == pytest.approx(0.76 * 0.2 * 1.05, rel=0.01)
+    assert backward == pytest.approx(0.76 * 0.2 * 0.95, rel=0.01)
+    language, german = page_note(note, "de")
+    assert language == "de"
+    assert german.startswith("µk hängt von der Richtung ab: 0,1")
+    assert "in 6 Aufzeichnungen in Richtung +1, 0,1" in german
+    assert "in 6 in Richtung -1: die Reibung ist richtungsabhängig" in german
+
+
+def test_where_mu_k_scatters_as_much_nothing_is_said_of_direction(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    estimate(campaign(tmp_path / "c", by_direction(0.0)), None, tmp_path / "o.csv")
+    assert "direction" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.9])
+def test_which_way_a_slide_went_is_its_direction(factor: float) -> None:
+    """It has no direction of its own: nothing struck it."""
+    there, back = (Channel(np.arange(4.0), sign * np.array([0.0, 1.0, 2.0, 2.5])) for sign in (1.0, -1.0))
+    shots = tuple(Capture(n, math.nan, 1.0, None, back if n % 2 else there, direction=1) for n in range(1, 9))
+    slides = Campaign(Excitation.FREE_SLIDE, shots)
+    mu_k = {n: 0.2 * (factor if n % 2 else 1.0) + 1e-4 * n for n in range(1, 9)}
+    assert bool(note_of_direction(slides, mu_k)) is (factor < 1.0)
+    assert note_of_direction(slides, mu_k | dict.fromkeys((1, 3), math.nan)) == ""
 
 
 def test_a_cells_model_is_used_and_rows_go_to_standard_output(

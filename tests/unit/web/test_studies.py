@@ -344,6 +344,12 @@ async def test_friction_of_each_shot(page: Page, verbs: Verbs) -> None:
                 writer.writerows(rows)
 
         verbs.on_run = write
+        noted = (
+            "mu_k goes with direction: 0.1597 ± 0.0016 in 6 shots along +1, 0.1445 ± 0.0012 in 7 shots along "
+            "-1: friction differs by direction, "
+            "or the surface is not level; a mean of both is that of neither"
+        )
+        verbs.outcomes["estimate"] = VerbOutcome(0, "", ("plant fitted to 13 of 13 shots", noted))
         await client.post(f"/studies/{study}/run", data={"csrf": await csrf_of(client), "goal": "estimate"})
         found = await until(page, study, Stage.DONE)
         values = [float(row["mu_s"]) for row in rows]
@@ -354,9 +360,12 @@ async def test_friction_of_each_shot(page: Page, verbs: Verbs) -> None:
         assert "<td>0.0020</td>" in text, "two standard deviations behind ±; the file has one"
         assert "µs 0.3183 is outside the calibrated" in text
         assert "200/249 shots are shown" in text
+        assert f'lang="en">{noted}' in text
         german = (await client.get(f"/studies/{study}?lang=de")).text
         assert "<td>0,3183</td><td>0,0020</td><td>0,15234</td>" in german
         assert "unsicher: µs 0,3183 liegt außerhalb des Kalibrierten" in german
+        assert 'lang="de">µk hängt von der Richtung ab: 0,1597 ± 0,0016 in 6 Aufzeichnungen' in german
+        assert 'lang="en">plant fitted to' in german
         assert (await client.get(f"/studies/{study}/files/friction.csv")).text.startswith("shot,")
     assert "--cell" not in verbs.asked[0]
 
