@@ -73,18 +73,28 @@ def step(
     positioning: PositioningState,
     announcement: BatchAnnouncement | None = None,
     faults: tuple[str, ...] = (),
+    *,
+    restarted: bool = False,
 ) -> StepResult:
-    """Take one cycle through the whole pipeline; `faults` is what the fieldbus found wrong with it."""
+    """Take one cycle through the whole pipeline.
+
+    Parameters
+    ----------
+    faults : tuple of str
+        What the fieldbus found wrong with it.
+    restarted : bool
+        Whether the fieldbus found that the module was started anew since the one before.
+    """
     capture = fill_defaults(design.defaults, capture)
     features = extract(capture)
-    named = assign_batch(_of_session(state, capture), capture, announcement)
+    named = assign_batch(_of_life(state, capture, restarted=restarted), capture, announcement)
     is_expected = named.expected or state.model_changed
     friction = degrade_quality(estimate_from_features(features, design.model), faults)
     period_s = update_period(state.period_s, (state.cycle, state.time_ns), capture)
     tracked = wear_batch.update(
         design.tracker,
         state.tracker,
-        FrictionObservation.of(capture, friction, named.batch_id, expected=is_expected),
+        FrictionObservation.of(capture, friction, named.batch_id, expected=is_expected, restarted=restarted),
     )
     conditions = CycleConditions(
         batch_id=tracked.batch.batch_id,
@@ -191,10 +201,10 @@ def reset_wear_level(state: CellState, time_ns: int) -> CellState:
     )
 
 
-def _of_session(state: CellState, capture: Capture) -> BatchNaming:
+def _of_life(state: CellState, capture: Capture, *, restarted: bool) -> BatchNaming:
     """Give what has been said of the batch, without what was announced before the module started anew."""
     before = state.tracker.clock.session
-    has_started = before != capture.session and 0 not in (before, capture.session)
+    has_started = restarted or (before != capture.session and 0 not in (before, capture.session))
     return replace(state.batch, last_announcement=0) if has_started else state.batch
 
 

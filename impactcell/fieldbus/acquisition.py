@@ -36,6 +36,9 @@ from impactcell.records import CycleId, ModuleStatus
 
 __all__ = ["ModuleAcquisition", "ModuleStatus", "ReceivedCycle"]
 
+_NO_SESSION = "; or it was started anew, and how many are lost is not known: no register session tells"
+"""Said of a loss over an outage."""
+
 
 class ModuleAcquisition:
     """The FPGA module of one cell.
@@ -78,7 +81,7 @@ class ModuleAcquisition:
         self._on_change = on_change
         self._ready = asyncio.Event()
         self._acknowledgement = Acknowledgement(self._log, self.register_client, self._numbers)
-        self._connections = 0
+        self._connections = self._counted_on = 0  # the latter: those that there were at the last cycle
         self._said_given_up = False
         self._identity = IdentityCheck(cell, self.register_client, self._status_reader)
 
@@ -279,9 +282,18 @@ class ModuleAcquisition:
         if received.missed:
             are, them = ("is", "it") if received.missed == 1 else ("are", "them")
             why = "was started anew, or had overwritten" if received.restarted else "had overwritten"
+            tells = received.restarted or received.cycle_id.session or self._connections == self._counted_on
+            doubt = "" if tells else _NO_SESSION
             self._log.warning(
-                "%d before it %s lost: the module %s %s", received.missed, are, why, them, cycle=cycle
+                "%d before it %s lost: the module %s %s%s",
+                received.missed,
+                are,
+                why,
+                them,
+                doubt,
+                cycle=cycle,
             )
+        self._counted_on = self._connections
         for fault in received.faults:
             said = fault.removeprefix(f"{self.cell}: cycle {cycle}").lstrip(": ")
             self._log.warning("%s", said, cycle=cycle)

@@ -206,7 +206,11 @@ class CellTask:
         capture = received.capture
         task = self._positioning
         result = await self.worker.process(
-            capture, self._positioning_state(), self._announcement(), received.faults
+            capture,
+            self._positioning_state(),
+            self._announcement(),
+            received.faults,
+            restarted=received.restarted,
         )
         if task is not None:
             await self.worker.run(partial(task.update_friction, result.step_result.snapshot))

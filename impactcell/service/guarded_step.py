@@ -24,15 +24,19 @@ def guarded_step(
     positioning: PositioningState,
     announcement: BatchAnnouncement | None,
     faults: tuple[str, ...],
+    *,
+    restarted: bool,
 ) -> StepResult:
     """Take a cycle through `cell.step`; one that cannot be computed counts, without its content."""
     with _computing:
         try:
-            return core.step(design, state, capture, positioning, announcement, faults)
+            return core.step(design, state, capture, positioning, announcement, faults, restarted=restarted)
         except Exception as error:
             # A capture that nobody foresaw must not stop the cell.
             log.exception("cannot be computed; it counts as unreadable", cycle=capture.cycle)
             reason = f"cannot be computed ({type(error).__name__}: {error})"
             fault = f"{design.name}: cycle {capture.cycle}: {reason}"
             empty = replace(capture, force=None, position=None, actuator=None, summary=None)
-            return core.step(design, state, empty, positioning, announcement, (*faults, fault))
+            return core.step(
+                design, state, empty, positioning, announcement, (*faults, fault), restarted=restarted
+            )

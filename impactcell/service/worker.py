@@ -149,9 +149,16 @@ class CellWorker:
         positioning: PositioningState,
         announcement: BatchAnnouncement | None,
         faults: tuple[str, ...] = (),
+        *,
+        restarted: bool = False,
     ) -> CycleResult:
         """Take one cycle through the pipeline and store it."""
-        processed = await self.run(lambda: self._process(capture, positioning, announcement, faults))
+
+        def step() -> StepResult:
+            given = self._state, capture, positioning, announcement, faults
+            return guarded_step(self.log, self._design, *given, restarted=restarted)
+
+        processed = await self.run(lambda: self._process(capture, step))
         if self._journal_writer.maintenance_due:
             self._thread.submit(self._maintain, capture.time_ns)  # what is shown need not wait for it
         return processed
@@ -237,16 +244,8 @@ class CellWorker:
             self._record(fitted)
         self._state = fitted
 
-    def _process(
-        self,
-        capture: Capture,
-        positioning: PositioningState,
-        announcement: BatchAnnouncement | None,
-        faults: tuple[str, ...],
-    ) -> CycleResult:
-        step_result = guarded_step(
-            self.log, self._design, self._state, capture, positioning, announcement, faults
-        )
+    def _process(self, capture: Capture, step: Callable[[], StepResult]) -> CycleResult:
+        step_result = step()
         state, snapshot = step_result.state, step_result.snapshot
         last = CycleId(capture.session, capture.cycle)
         is_kept = self._journal_writer.journal is not None

@@ -77,6 +77,8 @@ def update_clock(
     reorder_limit: int,
     session: int = 0,
     farthest: float = math.inf,
+    *,
+    restarted: bool = False,
 ) -> tuple[CycleClock, CycleTiming]:
     """Find where a cycle belongs and move the clock there.
 
@@ -92,12 +94,14 @@ def update_clock(
         The module's; another one than before says that it counts anew, 0 says nothing.
     farthest : float
         Cycles ahead beyond which a number is in doubt.
+    restarted : bool
+        Whether the module is known to count anew from this cycle on, whatever it says of its session.
     """
     index, session = cycle + clock.base, session or clock.session
     if not clock.seen:
         timing = CycleTiming(index, 0, 0, repeated=False)
         return CycleClock(clock.base, index, (index,), time_ns, session=session), timing
-    is_new_session = clock.session not in (0, session)
+    is_new_session = restarted or clock.session not in (0, session)
     lag = clock.last - index
     if not is_new_session and (index == clock.last or index in clock.seen):
         note = f"cycle {cycle} came twice, the second is ignored"

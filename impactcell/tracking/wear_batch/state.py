@@ -37,6 +37,8 @@ class FrictionObservation:
         Part of mu_s_std that other cycles share; nan where it is not known.
     number_is_sure : bool
         The cycle's number is not to be doubted however far ahead it is: those after it are known.
+    restarted : bool
+        The module is known to count its cycles anew from this one on, also where it has no session.
     """
 
     cycle: int
@@ -49,10 +51,17 @@ class FrictionObservation:
     doubt: str = ""
     common_std: float = math.nan
     number_is_sure: bool = False
+    restarted: bool = False
 
     @classmethod
     def of(
-        cls, capture: Capture, estimate: FrictionEstimate, batch_id: str | None, *, expected: bool = False
+        cls,
+        capture: Capture,
+        estimate: FrictionEstimate,
+        batch_id: str | None,
+        *,
+        expected: bool = False,
+        restarted: bool = False,
     ) -> "FrictionObservation":
         """Take the published mu_s of the estimate from a capture."""
         mu_s = estimate.mu_s
@@ -67,6 +76,7 @@ class FrictionObservation:
             capture.session,
             doubt,
             mu_s.common_std,
+            restarted=restarted,
         )
 
 

@@ -56,6 +56,7 @@ def update(
         settings.reorder_limit,
         observation.session,
         _farthest(settings, state, observation),
+        restarted=observation.restarted,
     )
     fault, is_unusable = input_validation.validate_estimate(observation.mu_s, observation.mu_s_std)
     notes = [note for note in (timing.note, fault) if note]

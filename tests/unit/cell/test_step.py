@@ -218,6 +218,27 @@ def test_what_happens_beside_the_cycles_carries_the_cycle_and_its_own_time(
     assert refused.alarms == late.alarms
 
 
+def test_cycles_after_a_restart_without_a_session_are_used_as_any_others(design: CellDesign) -> None:
+    """Its first ones had the numbers of cycles of before, and were ignored as having come twice."""
+
+    def of_no_session(cycle: int, seed: int) -> Capture:
+        return replace(capture(seed), cycle=cycle, session=0, time_ns=(seed + 5) * SECOND)
+
+    state = core.initial_state(design)
+    for cycle in range(1, LEARNED + 1):
+        state = core.step(design, state, of_no_session(cycle, cycle), PositioningState()).state
+    state = replace(state, batch=replace(state.batch, last_announcement=9))
+    for cycle in (2, 3, 4):
+        done = core.step(
+            design, state, of_no_session(cycle, LEARNED + cycle), PositioningState(), restarted=cycle == 2
+        )
+        assert done.notes == (("cycle numbers restarted at 2",) if cycle == 2 else ())
+        assert done.state.tracker.clock.last == state.tracker.clock.last + 1
+        assert done.state.batch.last_announcement == 0
+        state = done.state
+    assert state.tracker.clock.number(state.tracker.clock.last) == 4
+
+
 def test_a_state_of_another_grid_learns_its_signature_anew(design: CellDesign, learned: CellState) -> None:
     wider = replace(design, signature=replace(design.signature, points=40))
     fitted = core.migrate_state(wider, learned, 99 * SECOND)

@@ -167,6 +167,28 @@ async def test_a_counter_of_16_bits_goes_on_after_its_end() -> None:
         assert module.status.restarts == 0
 
 
+async def test_what_an_unseen_start_would_look_like_too_is_told_as_both(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """By a counter alone nobody knows; while the link was up, no start was missed."""
+    device = ScriptedDevice(SUMMARY, counter=65_009)
+    make_summary(device)
+    async with running(SUMMARY, device, after=CycleId(0, 10)) as (server, _module, receptions):
+        (received,) = await take(receptions, 1)
+        assert (received.cycle_id, received.missed) == (CycleId(0, 65_010), 64_999)
+        asked = server.requests
+        coming = asyncio.ensure_future(take(receptions, 1))
+        while server.requests < asked + 3:
+            await asyncio.sleep(0)
+        make_summary(device, 3)
+        (received,) = await coming
+        assert (received.cycle_id, received.missed) == (CycleId(0, 65_013), 2)
+    told = [record.getMessage() for record in caplog.records if "lost: " in record.getMessage()]
+    certain = "are lost: the module had overwritten them"
+    doubt = "; or it was started anew, and how many are lost is not known: no register session tells"
+    assert [line.split(" before it ")[1] for line in told] == [certain + doubt, certain]
+
+
 async def test_a_restart_that_only_the_counter_tells() -> None:
     device = ScriptedDevice(SUMMARY)
     make_summary(device, 40)

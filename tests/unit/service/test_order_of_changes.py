@@ -109,7 +109,7 @@ async def running(
         task.worker._thread = thread
         task._positioning = SimpleNamespace(state=PositioningState(), update_friction=lambda _snapshot: None)
 
-        def step(*given: Any) -> StepResult:
+        def step(*given: Any, **_more: Any) -> StepResult:
             _log, _design, state, capture, positioning, *_ = given
             state, _done = core.apply_event(state, ALARM, AlarmEvent(EventKind.COMMENT, comment="a cycle"))
             snapshot = replace(

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -167,11 +168,11 @@ async def test_a_capture_that_cannot_be_computed_counts_as_unreadable(
     step = core.step
 
     def fails_with_samples(
-        design: core.CellDesign, state: core.CellState, capture: Capture, *rest: object
+        design: core.CellDesign, state: core.CellState, capture: Capture, *rest: Any, **more: Any
     ) -> object:
         if capture.force is not None:
             raise np.linalg.LinAlgError("singular")
-        return step(design, state, capture, *rest)  # type: ignore[arg-type]
+        return step(design, state, capture, *rest, **more)
 
     monkeypatch.setattr(core, "step", fails_with_samples)
     processed = await worker.process(make_capture(1), PositioningState(), None)
@@ -289,7 +290,7 @@ async def test_no_more_cells_compute_at_a_time_than_there_are_cores(
     at_work, most = 0, 0
     met = threading.Barrier(3)
 
-    def counted(*arguments: object) -> core.StepResult:
+    def counted(*arguments: Any, **more: Any) -> core.StepResult:
         nonlocal at_work, most
         with lock:
             at_work += 1
@@ -297,7 +298,7 @@ async def test_no_more_cells_compute_at_a_time_than_there_are_cores(
         with contextlib.suppress(threading.BrokenBarrierError):
             met.wait(0.1)  # as long as another could come
         try:
-            return step(*arguments)  # type: ignore[arg-type]
+            return step(*arguments, **more)
         finally:
             with lock:
                 at_work -= 1
