@@ -41,12 +41,13 @@ def machine_parts(base: BaseModel, *, is_driven: bool) -> dict[str, Column]:
 def like_the_machine(blocks: Blocks, term: ChosenTerm, parts: Iterable[Column], base: BaseModel) -> bool:
     """Whether a term looks like a part of the machine.
 
-    Beside a constant force that is free: from where a position is counted does not matter then.
+    Beside a constant force that is free: from where a position is counted does not matter then. Of one in
+    each record the blocks have nothing any more.
     """
     places = blocks.places(term.columns)
     total = blocks.products.sum(axis=0)
     whole = np.diag(total)[places]
-    if math.isinf(base.force_offset.std):
+    if math.isinf(base.force_offset.std) and not base.force_offset_by_record:
         (offset,) = blocks.places([OFFSET])
         total = total - np.outer(total[:, offset], total[offset]) / total[offset, offset]
     own, left = blocks.places(parts), np.diag(total)[places]

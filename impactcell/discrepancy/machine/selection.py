@@ -142,15 +142,16 @@ def _beside_smooth_force(
     needs = needs_of_terms(smooth_force, columns, [*choices.values()], search.shapes)
     most = max(needs, key=lambda name: needs[name][0])
     need, shape = needs[most]
+    before = search.losses(columns)
+    term = search.trial(ChosenTerm(choices[most], shape), columns, before)
     if step.accepted is not None:
         own, _ = needs[step.accepted.term.choice.name]
-        if own >= MIN_NEED and need - own < MIN_NEED:
+        closes_less = term.gain < MIN_SHARE_OF_ALL * step.accepted.gain
+        if own >= MIN_NEED and (need - own < MIN_NEED or closes_less):
             return step
     free = max(needs_of_free_forms(smooth_force, columns).values())
     if need < max(MIN_NEED, free - MIN_NEED):
         return replace(step, accepted=None, tied_with=(), reason=step.reason or SMOOTH_FORCE)
-    before = search.losses(columns)
-    term = search.trial(ChosenTerm(choices[most], shape), columns, before)
     others = [trial for trial in step.trials if trial.term.choice.name != most]
     if term.at_end and not step.reason:
         step = replace(step, trials=(term, *others), reason=END_OF_RANGE)
