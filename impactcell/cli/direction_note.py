@@ -2,11 +2,11 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from statistics import fmean, variance
+from statistics import fmean, stdev
 from typing import Final
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.stats import ttest_ind_from_stats
 
 from impactcell.campaign import Campaign, Excitation
 from impactcell.records import Capture
@@ -52,14 +52,12 @@ def _sense(slide: Capture) -> int:
 
 
 def _differ(one: Sequence[float], other: Sequence[float]) -> bool:
-    difference = abs(fmean(one) - fmean(other))
-    squares = [variance(values) / len(values) for values in (one, other)]
-    error = math.sqrt(sum(squares))
-    if difference < LEAST_SHARE * fmean((*one, *other)) or error == 0.0:
+    (ahead, ahead_std), (back, back_std) = ((fmean(values), stdev(values)) for values in (one, other))
+    if abs(ahead - back) < LEAST_SHARE * fmean((*one, *other)) or ahead_std == back_std == 0.0:
         return False
-    freedom = error**4 / sum(s**2 / (len(v) - 1) for s, v in zip(squares, (one, other), strict=True))
-    return 2.0 * float(student.sf(difference / error, freedom)) < P_VALUE
+    test = ttest_ind_from_stats(ahead, ahead_std, len(one), back, back_std, len(other), equal_var=False)
+    return float(test.pvalue) < P_VALUE
 
 
 def _mean(values: Sequence[float]) -> str:
-    return plus_minus(fmean(values), math.sqrt(variance(values) / len(values)), ".4f")
+    return plus_minus(fmean(values), stdev(values) / math.sqrt(len(values)), ".4f")

@@ -33,6 +33,8 @@ MIN_SHARE_OF_ALL = 0.5
 """Share of what all terms together close that a term has to close: beside a model error it stands out [1]."""
 MIN_SHARE_OF_FREE = 0.8
 """Share of what a free form in the same place closes that a named term has to close [1]."""
+MIN_SHARE_OF_NEEDED = 0.5
+"""Share of what a term that records need closes, that another one has to close to take its place [1]."""
 MAX_TERMS = 2
 """Terms that one run takes, the second only if nothing is left then: any other is likelier to be a patch on
 what the catalogue lacks [1]."""
@@ -146,7 +148,7 @@ def _beside_smooth_force(
     term = search.trial(ChosenTerm(choices[most], shape), columns, before)
     if step.accepted is not None:
         own, _ = needs[step.accepted.term.choice.name]
-        closes_less = term.gain < MIN_SHARE_OF_ALL * step.accepted.gain
+        closes_less = term.gain < MIN_SHARE_OF_NEEDED * step.accepted.gain
         if own >= MIN_NEED and (need - own < MIN_NEED or closes_less):
             return step
     free = max(needs_of_free_forms(smooth_force, columns).values())
