@@ -46,11 +46,11 @@ def test_which_term_and_which_end_it_was(
 
 
 def cogging() -> MachineFinding:
-    """An axis that cogs a little more than twelve times in its stroke."""
-    return investigate_machine(axis(lambda q, _: 0.5 * np.sin(2.0 * np.pi * q / 0.0405)), AXIS)
+    """An axis that cogs a little more than 24 times in its stroke."""
+    return investigate_machine(axis(lambda q, _: 0.5 * np.sin(2.0 * np.pi * q / 0.0206)), AXIS)
 
 
-def test_cogging_that_is_finer_than_a_twelfth_of_the_stroke_is_told_as_such() -> None:
+def test_cogging_that_is_finer_than_what_is_looked_for_is_told_as_such() -> None:
     finding = cogging()
     assert finding.established == ()
     period = finding.steps[0].trials[0].term.shape

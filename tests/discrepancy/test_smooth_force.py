@@ -24,7 +24,7 @@ from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.weak_form import Column, Rows
 from impactcell.records import Capture, Channel, Samples
 
-OFFSET, FREE, DRAG = ("offset", 0.0, 0), ("free", 0.0, 0), ("drag", 0.0, 0)
+OFFSET, FREE, OWN, DRAG = ("offset", 0.0, 0), ("free", 0.0, 0), ("own", 0.0, 0), ("drag", 0.0, 0)
 RANGES = {"position": (-0.3, 0.7), "speed": (0.0, 2.0), "load": (0.0, 1.0)}
 Law = Callable[[Samples, Samples], Samples]
 
@@ -54,9 +54,14 @@ def rows_of(target: Samples, columns: dict[Column, Samples], waves: Samples, sig
     return Rows(target, every, nothing, np.arange(float(count)), np.full(count, sigma**2), nothing)
 
 
-def dense(target: Samples, columns: Sequence[tuple[Samples, float]], waves: Samples, sigma: float) -> float:
-    """The same by dense covariances s² (V + k² P P' + X D X'), s of the largest likelihood, at least 1."""
-    values = []
+def dense(
+    target: Samples, columns: Sequence[tuple[Samples, float]], waves: Samples, sigma: float
+) -> tuple[float, float]:
+    """The same by dense covariances s² (V + k² P P' + X D X'), s of the largest likelihood, at least 1.
+
+    Also s² at the level of the largest.
+    """
+    values, spreads = [], []
     for length in smooth_force.LENGTHS:
         shapes = waves * np.sqrt(smooth_force._spectrum(length))
         shapes /= math.sqrt((shapes**2).sum() / sigma**2 / len(target))
@@ -65,34 +70,49 @@ def dense(target: Samples, columns: Sequence[tuple[Samples, float]], waves: Samp
             for column, std in columns:
                 covariance += std**2 * np.outer(column, column)
             left = float(target @ np.linalg.solve(covariance, target)) / len(target)
-            spread = max(left, 1.0)
-            values.append(multivariate_normal.logpdf(target, cov=spread * covariance))
-    return float(np.logaddexp.reduce(values)) - math.log(len(values))
+            spreads.append(max(left, 1.0))
+            values.append(multivariate_normal.logpdf(target, cov=spreads[-1] * covariance))
+    return float(np.logaddexp.reduce(values)) - math.log(len(values)), spreads[int(np.argmax(values))]
+
+
+def size_of(column: Samples, target: Samples, model: Samples) -> float:
+    """Strength at which what is new in a column explains as much as a model leaves."""
+    new, left = (y - model @ np.linalg.lstsq(model, y, rcond=None)[0] for y in (column, target))
+    return float(np.linalg.norm(left) / np.linalg.norm(new))
 
 
 @pytest.mark.parametrize("strength", [0.0, 0.4, 4.0])
-def test_evidence_is_that_of_dense_normal_distributions(strength: float) -> None:
+@pytest.mark.parametrize("stated", [1.0, 0.02], ids=["noise as stated", "noise stated far too small"])
+def test_evidence_is_that_of_dense_normal_distributions(strength: float, stated: float) -> None:
     rng = np.random.default_rng(8)
     count, sigma = 60, 0.3
     x, u = rng.uniform(-1.0, 1.0, (2, count))
     found = smooth_force_columns(motion(0.2 + 0.5 * x, 2.0 * u), np.sign(u), RANGES)
     waves = np.stack([values for name, values in found.items() if name[0] == NAME], axis=1)
-    columns = {OFFSET: np.ones(count), FREE: x, DRAG: -u * np.abs(u)}
-    target = 0.7 + strength * columns[DRAG] + 0.5 * np.sin(2.0 * x + u) + sigma * rng.normal(size=count)
+    columns = {OFFSET: np.ones(count), FREE: x, OWN: np.cos(5.0 * x), DRAG: -u * np.abs(u)}
+    target = 0.7 + strength * columns[DRAG] + 0.5 * np.sin(2.0 * x + u) + 0.4 * columns[OWN]
+    target += sigma * rng.normal(size=count)
+    sigma *= stated
     priors = {OFFSET: NumberPrior(0.0, 0.5), FREE: NumberPrior(0.0, math.inf)}
     force = SmoothForce(
         rows_of(target, columns, waves, sigma), np.ones(count, dtype=bool), count, priors, frozenset()
     )
     nuisances = np.stack([columns[OFFSET], columns[FREE]], axis=1)
-    left = target - nuisances @ np.linalg.lstsq(nuisances, target, rcond=None)[0]
-    size = math.sqrt(left @ left / (columns[DRAG] @ columns[DRAG]))
+    model = np.column_stack([nuisances, columns[OWN]])
     free = smooth_force.NUISANCE_STD * math.sqrt(target @ target / (x @ x))
-    base = [(columns[OFFSET], 0.5), (x, free)]
-    without = dense(target, base, waves, sigma)
+    base = [
+        (columns[OFFSET], 0.5),
+        (columns[FREE], free),
+        (columns[OWN], size_of(columns[OWN], target, nuisances)),
+    ]
+    _, spread = dense(target, base, waves, sigma)
+    base = [(column, std / math.sqrt(spread)) for column, std in base]
+    without, _ = dense(target, base, waves, sigma)
+    need = force.beside([OFFSET, FREE, OWN])
     for share in (1.0, 0.1):
-        expected = dense(target, [*base, (columns[DRAG], share * size)], waves, sigma) - without
-        own = force.evidence([OFFSET, FREE], [DRAG], share) - force.evidence([OFFSET, FREE])
-        assert own == pytest.approx(expected, abs=1e-6)
+        std = share * size_of(columns[DRAG], target, model) / math.sqrt(spread)
+        expected, _ = dense(target, [*base, (columns[DRAG], std)], waves, sigma)
+        assert need([DRAG], share) == pytest.approx(expected - without, abs=1e-6)
 
 
 def test_a_strength_that_may_not_be_negative() -> None:
@@ -111,8 +131,8 @@ def test_a_strength_that_may_not_be_negative() -> None:
         {OFFSET: NumberPrior(0.0, math.inf)},
         frozenset([DRAG]),
     )
-    assert force.evidence([OFFSET], [DRAG]) == -math.inf
-    assert force.evidence([OFFSET, DRAG], [FREE]) == pytest.approx(force.evidence([OFFSET], [FREE]))
+    assert force.beside([OFFSET])([DRAG], 1.0) == -math.inf
+    assert force.beside([OFFSET, DRAG])([FREE], 1.0) == pytest.approx(force.beside([OFFSET])([FREE], 1.0))
 
 
 SLIDE = BaseModel(

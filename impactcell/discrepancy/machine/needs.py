@@ -15,7 +15,7 @@ MIN_NEED = 3.0
 """Logarithm of how much likelier records have to be with a term than with a smooth force alone [1]."""
 TIED_NEED = 3.0
 """Logarithm of how much likelier they are with the best term, up to which another one is tied with it [1]."""
-FREE_SIZES = (1.0, 0.1, 0.01)
+FREE_SIZES = (1.0, 0.3, 0.1)
 """Sizes of the corners of a free form, over that at which one would explain all there is [1]."""
 
 
@@ -29,24 +29,22 @@ def needs_of_terms(
 
     Every value of its shape is as likely beforehand as the others.
     """
-    without = smooth_force.evidence(columns)
+    need = smooth_force.beside(columns)
     needs = {}
     for choice in choices:
         grid = shapes[choice.name]
-        values = [
-            smooth_force.evidence(columns, ChosenTerm(choice, shape).columns) - without for shape in grid
-        ]
+        values = [need(ChosenTerm(choice, shape).columns, 1.0) for shape in grid]
         needs[choice.name] = _mean(values), grid[int(np.argmax(values))]
     return needs
 
 
 def needs_of_free_forms(smooth_force: SmoothForce, columns: Sequence[Column]) -> dict[str, float]:
     """By free form, how much likelier records are with it, at corners of some size (logarithm)."""
-    without = smooth_force.evidence(columns)
+    need = smooth_force.beside(columns)
     needs = {}
     for form in FREE_FORMS:
         corners = [(form, 0.0, number) for number in range(KNOTS)]
-        needs[form] = _mean([smooth_force.evidence(columns, corners, size) - without for size in FREE_SIZES])
+        needs[form] = _mean([need(corners, size) for size in FREE_SIZES])
     return needs
 
 

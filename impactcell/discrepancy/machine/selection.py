@@ -32,7 +32,8 @@ MIN_SHARE = 0.2
 MIN_SHARE_OF_ALL = 0.5
 """Share of what all terms together close that a term has to close: beside a model error it stands out [1]."""
 MIN_SHARE_OF_FREE = 0.8
-"""Share of what a free form in the same place closes that a named term has to close [1]."""
+"""Share of what a free form in the same place closes, and of how much records need it, that a named term has
+to have [1]."""
 MIN_SHARE_OF_NEEDED = 0.5
 """Share of what a term that records need closes, that another one has to close to take its place [1]."""
 MAX_TERMS = 2
@@ -42,6 +43,10 @@ MIN_SECOND_GAP = 2.0
 """Gap in noise floors beside the first term from which on a second one is named [1]."""
 SMOOTH_FORCE = "a smooth force of position and speed explains these records as well as any named term"
 """Why the best term is not taken where nothing needs it."""
+FREE_FORM = "a free form in the same place does much better than any named term"
+"""Why the best term is not taken where something else acts in its place."""
+FREE_FORM_ELSEWHERE = "a free form in another place does much better than any named term"
+"""Why the term that records need most is not taken where they need a function elsewhere more."""
 NOT_IN_EVERY_BLOCK = "no term does better in block after block that it was not fitted to"
 """Why the best term is not taken where its gain scatters too much from block to block."""
 END_OF_RANGE = "the shape of the best term came to the end of its range"
@@ -127,8 +132,8 @@ def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermCh
     if reason == NOT_IN_EVERY_BLOCK and best.gain > 0.0 and not best.at_end:
         least = max(MIN_SHARE * excess, MIN_SHARE_OF_ALL * gain_of_all)
         shown = _beside_another(search, (columns, before), trials, least)
-        if shown is not None:
-            return replace(step, accepted=shown[0], beside=shown[1], reason="")
+        if shown is not None and _is_needed(search, [*columns, *shown[1].columns], shown[0].term):
+            return replace(step, accepted=shown[0], beside=shown[1].choice.name, reason="")
     if not reason:
         step = replace(step, accepted=best, tied_with=tied_terms(search, before, best, trials[1:]))
     if search.smooth_force is None:
@@ -144,16 +149,18 @@ def _beside_smooth_force(
     needs = needs_of_terms(smooth_force, columns, [*choices.values()], search.shapes)
     most = max(needs, key=lambda name: needs[name][0])
     need, shape = needs[most]
+    free = needs_of_free_forms(smooth_force, columns)
     before = search.losses(columns)
     term = search.trial(ChosenTerm(choices[most], shape), columns, before)
     if step.accepted is not None:
-        own, _ = needs[step.accepted.term.choice.name]
+        accepted = step.accepted.term.choice
+        own, _ = needs[accepted.name]
         closes_less = term.gain < MIN_SHARE_OF_NEEDED * step.accepted.gain
-        if own >= MIN_NEED and (need - own < MIN_NEED or closes_less):
+        if not _not_needed(own, free, accepted) and (need - own < MIN_NEED or closes_less):
             return step
-    free = max(needs_of_free_forms(smooth_force, columns).values())
-    if need < max(MIN_NEED, free - MIN_NEED):
-        return replace(step, accepted=None, tied_with=(), reason=step.reason or SMOOTH_FORCE)
+    reason = _not_needed(need, free, choices[most]) or _needed_elsewhere(need, free)
+    if reason:
+        return replace(step, accepted=None, tied_with=(), reason=step.reason or reason)
     others = [trial for trial in step.trials if trial.term.choice.name != most]
     if term.at_end and not step.reason:
         step = replace(step, trials=(term, *others), reason=END_OF_RANGE)
@@ -163,10 +170,37 @@ def _beside_smooth_force(
     return replace(step, accepted=term, tied_with=tuple(tied), reason="")
 
 
+def _is_needed(search: TermSearch, columns: Sequence[Column], term: ChosenTerm) -> bool:
+    """Whether records need a term beside a model and a smooth force, and no free form much more."""
+    if search.smooth_force is None:
+        return True
+    need = search.smooth_force.beside(columns)(term.columns, 1.0)
+    free = needs_of_free_forms(search.smooth_force, columns)
+    return not (_not_needed(need, free, term.choice) or _needed_elsewhere(need, free))
+
+
+def _not_needed(need: float, needs_of_free: Mapping[str, float], choice: TermChoice) -> str:
+    """Say why a term is not named that records need so much; empty if it may be."""
+    if need < MIN_NEED:
+        return SMOOTH_FORCE
+    in_its_place = needs_of_free.get(PLACES.get(choice.identifier, ""), -math.inf)
+    return "" if _is_about(need, in_its_place) else FREE_FORM
+
+
+def _needed_elsewhere(need: float, needs_of_free: Mapping[str, float]) -> str:
+    """Say that records need a function in any place more; empty if they do not."""
+    return "" if _is_about(need, max(needs_of_free.values())) else FREE_FORM_ELSEWHERE
+
+
+def _is_about(need: float, free: float) -> bool:
+    """Whether a term does about as well as a free form: of many records any law is a little off."""
+    return need >= min(free - MIN_NEED, MIN_SHARE_OF_FREE * free)
+
+
 def _beside_another(
     search: TermSearch, model: tuple[list[Column], Samples], trials: Sequence[Trial], least: float
-) -> tuple[Trial, str] | None:
-    """Best term as it shows beside another one, and that one's name; None where it does not.
+) -> tuple[Trial, ChosenTerm] | None:
+    """Best term as it shows beside another one, and that one; None where it does not.
 
     Where each of two shows only beside the other (speed falls where pressure rises), no step of one finds
     either. Both have to hold from block to block, together and each beside the other, the pair has to close
@@ -193,7 +227,7 @@ def _beside_another(
         together = before - search.losses([*columns, *one.term.columns, *two.term.columns])
         if is_tied(pair, replace(pair, gains=together, shares=search.shares(together, before))):
             return None
-    return own_trial, pair.term.choice.name
+    return own_trial, pair.term
 
 
 def _refusal(best: Trial, free_gains: Mapping[str, float], gain_of_all: float, excess: float) -> str:
@@ -208,5 +242,5 @@ def _refusal(best: Trial, free_gains: Mapping[str, float], gain_of_all: float, e
         return END_OF_RANGE
     free = free_gains.get(PLACES.get(best.term.choice.identifier, ""), -math.inf)
     if best.gain < MIN_SHARE_OF_FREE * free:
-        return "a free form in the same place does much better than any named term"
+        return FREE_FORM
     return ""

@@ -6,16 +6,15 @@ all its directions, so that it must not be large along the term alone.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import NumberPrior
-from impactcell.discrepancy.machine.regression import PIECES_PER_BLOCK
+from impactcell.discrepancy.machine.regression import PIECES_PER_BLOCK, RIDGE
 from impactcell.discrepancy.machine.rival_forms import Ranges, columns_of_corners
 from impactcell.discrepancy.machine.terms import MotionState
-from impactcell.discrepancy.machine.weak_form import Column, Rows
+from impactcell.discrepancy.machine.weak_form import Column, IndexArray, Rows
 from impactcell.records import Samples
 
 NAME = "smooth_force"
@@ -67,20 +66,13 @@ def _spectrum(length: float) -> Samples:
     return spectrum
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Level:
-    """Products of all columns and the target in the metric of one smooth force, and its log-determinant."""
-
-    products: Samples
-    log_determinant: float
-
-
 class SmoothForce:
     """Rows of a machine beside a smooth force of unknown level and correlation length.
 
     Rows r ~ N(X c, s² (V + k² P P')) with V the sensors' variances, P the waves by their spectrum, k the
-    level, s at least 1, and c ~ N(0, s² D); k and the length are averaged over, s is of the largest
-    likelihood, and what overlaps counts as `PIECES_PER_BLOCK` independent rows a block.
+    level, s at least 1, and c ~ N(0, s² D / s_0²), s_0 the s of the model that a term is put beside; k and
+    the length are averaged over, s is of the largest likelihood, and what overlaps counts as
+    `PIECES_PER_BLOCK` independent rows a block.
 
     Parameters
     ----------
@@ -112,26 +104,40 @@ class SmoothForce:
         stacked = np.stack([*(rows.columns[name][chosen] for name in names), rows.target[chosen]], axis=1)
         stacked /= sigma[:, None]
         self._whole = stacked.T @ stacked
+        self._priors = priors
         self._nonnegative = nonnegative
-        self._precision = self._precisions(priors)
         shapes = np.stack([rows.columns[name][chosen] for name in waves], axis=1) / sigma[:, None]
-        self._levels = [*self._by_level(shapes, stacked)]
+        self._products, self._log_determinants = map(
+            np.array, zip(*self._by_level(shapes, stacked), strict=True)
+        )
 
-    def _precisions(self, priors: Mapping[Column, NumberPrior]) -> Samples:
-        """Prior precision of each coefficient over 1/s²: a term may explain all that nuisances leave."""
-        size = np.maximum(np.diag(self._whole), np.finfo(float).tiny)
-        own = [self._place[name] for name in priors]
-        scaled = self._whole / np.outer(np.sqrt(size), np.sqrt(size))
-        found = np.linalg.lstsq(scaled[np.ix_(own, own)], scaled[own, -1], rcond=None)[0]
-        left = size[-1] * max(1.0 - float(scaled[own, -1] @ found), np.finfo(float).eps)
-        precision: Samples = size[:-1] / left
-        for name, prior in priors.items():
-            free = size[self._place[name]] / (NUISANCE_STD**2 * size[-1])
-            precision[self._place[name]] = 1.0 / prior.std**2 if math.isfinite(prior.std) else free
-        return precision
+    def beside(self, columns: Sequence[Column]) -> Callable[[Sequence[Column], float], float]:
+        """Put a model, by its columns, beside the force.
 
-    def _by_level(self, shapes: Samples, stacked: Samples) -> Iterator[_Level]:
-        """Invert V + k² P P' by the eigenvectors of P' P (Woodbury)."""
+        Returns
+        -------
+        callable
+            Logarithm of how much likelier the rows are with a term, by the term's columns and the standard
+            deviation of their strengths, over that at which one explains all that the model leaves; -inf
+            where a strength would be negative that may not be.
+        """
+        scale = self._precisions(columns)
+        _, spread = self._weigh(columns, (), scale)
+        precision = spread * scale
+        without, _ = self._weigh(columns, (), precision)
+
+        def need(term: Sequence[Column], size: float) -> float:
+            of_term = precision.copy()
+            of_term[[self._place[column] for column in term]] /= size**2
+            return self._weigh(columns, term, of_term)[0] - without
+
+        return need
+
+    def _by_level(self, shapes: Samples, stacked: Samples) -> Iterator[tuple[Samples, float]]:
+        """Products of columns and target in the metric of V + k² P P', by P' P's eigenvectors (Woodbury).
+
+        Also its log-determinant over that of V, level by level.
+        """
         for length in LENGTHS:
             waves = shapes * np.sqrt(_spectrum(length))
             waves /= math.sqrt(max(float((waves**2).sum()), np.finfo(float).tiny) / self._pieces)
@@ -141,39 +147,75 @@ class SmoothForce:
             for level in LEVELS:
                 share = level**2 / (1.0 + level**2 * sizes)
                 products = self._whole - (seen.T * share) @ seen
-                yield _Level(products, float(np.log1p(level**2 * sizes).sum()))
+                yield products, float(np.log1p(level**2 * sizes).sum())
 
-    def evidence(self, columns: Sequence[Column], term: Sequence[Column] = (), size: float = 1.0) -> float:
-        """Logarithm of the evidence of a model and a term beside it.
+    def _precisions(self, columns: Sequence[Column]) -> Samples:
+        """Give 1/D of each column: what is new in a term may explain all that the model leaves.
 
-        `size`: standard deviation of the term's strengths, over that at which one explains all there is.
-        -inf where a strength of the term would be negative that may not be.
+        What is new in a term of the model may explain all that nuisances leave; they are as priors say.
         """
-        every = (*columns, *term)
-        places = np.array([self._place[column] for column in every])
-        bounded = np.array([column in self._nonnegative for column in every])
-        is_own = np.arange(len(every)) >= len(columns)
-        precision = self._precision[places] / np.where(is_own, size**2, 1.0)
-        values = [self._at(level, places, (bounded, is_own), precision) for level in self._levels]
-        return float(np.logaddexp.reduce(values)) - math.log(len(values))
+        precision = self._over_left(columns)
+        own = [self._place[name] for name in columns]
+        precision[own] = self._over_left([*self._priors])[own]
+        size = np.diag(self._whole)
+        for name, prior in self._priors.items():
+            free = size[self._place[name]] / (NUISANCE_STD**2 * size[-1])
+            precision[self._place[name]] = 1.0 / prior.std**2 if math.isfinite(prior.std) else free
+        return precision
+
+    def _over_left(self, columns: Sequence[Column]) -> Samples:
+        """Squares of all columns over that of the target, each less what some columns explain of it."""
+        places = [self._place[name] for name in columns]
+        size = np.maximum(np.diag(self._whole), np.finfo(float).tiny)
+        scaled = self._whole / np.outer(np.sqrt(size), np.sqrt(size))
+        found = np.linalg.lstsq(scaled[np.ix_(places, places)], scaled[places], rcond=None)[0]
+        of_target = zip(columns, found[:, -1], strict=True)
+        beyond = {name for name, value in of_target if value < 0.0} & self._nonnegative
+        if beyond:
+            return self._over_left([name for name in columns if name not in beyond])
+        left = size * np.maximum(1.0 - (scaled[places] * found).sum(axis=0), RIDGE)
+        over: Samples = left[:-1] / left[-1]
+        return over
+
+    def _weigh(
+        self, columns: Sequence[Column], term: Sequence[Column], precision: Samples
+    ) -> tuple[float, float]:
+        """Logarithm of the evidence of a model and a term beside it, and s² at the level of the largest."""
+        places = np.array([self._place[column] for column in (*columns, *term)])
+        bounded = np.array([column in self._nonnegative for column in (*columns, *term)])
+        is_own = np.arange(len(places)) >= len(columns)
+        every = np.arange(len(self._products))
+        values, spreads = self._at(every, places, (bounded, is_own), precision[places])
+        return float(np.logaddexp.reduce(values)) - math.log(len(values)), float(spreads[np.argmax(values)])
 
     def _at(
-        self, level: _Level, places: np.ndarray, bounds: tuple[np.ndarray, np.ndarray], precision: Samples
-    ) -> float:
-        """Logarithm of the evidence at one level; a strength of the model that would be negative is 0."""
+        self,
+        levels: IndexArray,
+        places: IndexArray,
+        bounds: tuple[np.ndarray, np.ndarray],
+        precision: Samples,
+    ) -> tuple[Samples, Samples]:
+        """Logarithm of the evidence at some levels, and s²; a strength of the model is 0, not negative."""
         bounded, is_own = bounds
-        matrix = level.products[np.ix_(places, places)] + np.diag(precision)
-        size = np.sqrt(np.diag(matrix))
-        right = level.products[places, -1] / size
-        scaled = matrix / np.outer(size, size)
-        found = np.linalg.lstsq(scaled, right, rcond=None)[0]
+        products = self._products[levels]
+        matrix = products[:, places[:, None], places] + np.diag(precision)
+        size = np.sqrt(np.diagonal(matrix, axis1=1, axis2=2))
+        right = products[:, places, -1] / size
+        scaled = matrix / (size[:, :, None] * size[:, None, :])
+        found = np.linalg.solve(scaled, right[:, :, None])[:, :, 0]
+        left = np.maximum(products[:, -1, -1] - (right * found).sum(axis=1), 0.0)
+        spread = np.maximum(left / self._pieces, 1.0)
+        volume = np.linalg.slogdet(scaled)[1] + np.log(size**2 / precision).sum(axis=1)
+        fit = self._pieces * np.log(spread) + left / spread
+        values = -0.5 * (fit + self._log_determinants[levels] + volume)
         beyond = bounded & (found < 0.0)
-        if np.any(beyond & is_own):
-            return -math.inf
-        if beyond.any():
-            return self._at(level, places[~beyond], (bounded[~beyond], is_own[~beyond]), precision[~beyond])
-        left = max(float(level.products[-1, -1] - right @ found), 0.0)
-        spread = max(left / self._pieces, 1.0)
-        volume = float(np.linalg.slogdet(scaled)[1] + np.log(size**2 / precision).sum())
-        fit = self._pieces * math.log(spread) + left / spread
-        return -0.5 * (fit + level.log_determinant + volume)
+        for pattern in np.unique(beyond[beyond.any(axis=1)], axis=0):
+            alike = (beyond == pattern).all(axis=1)
+            if np.any(pattern & is_own):
+                values[alike] = -math.inf
+                continue
+            kept = ~pattern
+            values[alike], spread[alike] = self._at(
+                levels[alike], places[kept], (bounded[kept], is_own[kept]), precision[kept]
+            )
+        return values, spread

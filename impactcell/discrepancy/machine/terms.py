@@ -86,12 +86,13 @@ class Term:
     has_memory: bool = False
 
 
-SPEED_SHARES = (0.005, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3)
+SPEED_SHARES = (0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04, 0.056, 0.08, 0.11, 0.15, 0.21, 0.3)
 """Stribeck velocities over the largest speed: slower than a tenth of it as a rule, and never all of it."""
 LENGTH_SHARES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
 """Presliding lengths over the range of positions: microns to a tenth of the stroke."""
-PERIOD_SHARES = tuple(1.0 / n for n in (2, 3, 4, 6, 8, 12))
-"""Periods over the range of positions: two to twelve in it."""
+PERIOD_SHARES = tuple(2.0 / halves for halves in range(3, 49))
+"""Periods over the range of positions: one and a half to 24 in it, half of one apart, for a wave that is
+one period off over the range looks like nothing."""
 
 CATALOGUE: dict[str, Term] = {
     term.identifier: term

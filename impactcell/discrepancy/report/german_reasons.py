@@ -64,6 +64,8 @@ REASONS: Final[Patterns] = (
      f"({words_of(identifier_of(m[2]), 'de')}), dem {SIZES[m[5]]} Wert, der gesucht wird"),
     (r"a free form in the same place does much better than any named term",
      "eine freie Form an derselben Stelle ist viel besser als jeder benannte Term"),
+    (r"a free form in another place does much better than any named term",
+     "eine freie Form an anderer Stelle ist viel besser als jeder benannte Term"),
     (r"a smooth force of position and speed explains these records as well as any named term",
      "eine glatte Kraft über Ort und Geschwindigkeit erklärt diese Messungen so gut wie jeder Term"),
     (r"a smooth force of position and speed explains what remains as well as a law in one place",
