@@ -138,7 +138,7 @@ class MachineFits:
     def smooth_force(self, choices: Sequence[TermChoice]) -> SmoothForce:
         """Training rows of the base model's terms and others beside a smooth force."""
         rows = self.rows_with(choices, smooth_force_columns)
-        training, _ = self.blocks(rows)
+        training, _ = self.blocks(rows.only(()))
         chosen = self.plan.rows_of(rows, training)
         return SmoothForce(rows, chosen, len(training), self.priors, self.nonnegative)
 
@@ -150,8 +150,9 @@ class MachineFits:
         """Fit a model to the training blocks; with `settle` gravity and delay are found with it."""
         if settle:
             self._settle(terms)
-        training, _ = self.blocks()
-        fit = fit_blocks(training, self.columns(terms), self.priors, self.nonnegative)
+        columns = self.columns(terms)
+        training, _ = self.blocks(self.rows().only(columns))
+        fit = fit_blocks(training, columns, self.priors, self.nonnegative)
         delay_s = self.base.delay_s.value
         if DELAY in fit.columns:
             delay_s += float(fit.coefficients[fit.columns.index(DELAY)])
@@ -163,8 +164,9 @@ class MachineFits:
             if not self.base.delay_s.is_held:
                 self._settle_delay(terms)
             if free_gravity:
-                training, _ = self.blocks()
-                fit = fit_blocks(training, self.columns(terms), self.priors, self.nonnegative)
+                columns = self.columns(terms)
+                training, _ = self.blocks(self.rows().only(columns))
+                fit = fit_blocks(training, columns, self.priors, self.nonnegative)
                 place = fit.columns.index(("gravity_torque", 0.0, 0))
                 self.gravity = self.base.gravity_torque.value + float(fit.coefficients[place])
                 self.priors = nuisance_priors(self.base, self.gravity)
@@ -204,9 +206,10 @@ class MachineFits:
             self._settle(model.terms)
         own = [term for term in model.terms if not term_of(term.choice).is_friction]
         for _ in range(WEIGHINGS):
-            training, _ = self.blocks()
-            level = fit_blocks(training, [*self.columns(own), COULOMB], self.priors, self.nonnegative)
-            fit = fit_blocks(training, self.columns(model.terms), self.priors, self.nonnegative)
+            of_level, columns = [*self.columns(own), COULOMB], self.columns(model.terms)
+            training, _ = self.blocks(self.rows().only({*of_level, *columns}))
+            level = fit_blocks(training, of_level, self.priors, self.nonnegative)
+            fit = fit_blocks(training, columns, self.priors, self.nonnegative)
             rows = self._rows(self.gravity, self.delay_s)
             rows = self._without_constants(rows, row_weights(rows, self.doubt))
             residual = residual_of(rows, fit.columns, fit.coefficients)

@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.stats import t as student
@@ -22,7 +23,7 @@ BLOCKS_OF_RECORD = 100_000
 """Numbers of blocks that a record may have: a day of seconds [1]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Blocks:
     """Sums of products over each block's rows.
 
@@ -38,8 +39,6 @@ class Blocks:
         Cross-validation leaves out one fold at a time.
     number : ndarray of int, shape (b,)
         Which blocks they are.
-    without_folds : ndarray, shape (f, p + 1, p + 1)
-        Sums of products over all blocks but those of each fold, folds in their order.
     """
 
     names: tuple[Column, ...]
@@ -48,12 +47,12 @@ class Blocks:
     noise: Samples
     fold: IndexArray
     number: IndexArray
-    without_folds: Samples = field(init=False)
 
-    def __post_init__(self) -> None:
-        """Sum up, once for all models."""
+    @cached_property
+    def without_folds(self) -> Samples:
+        """Sums of products over all blocks but those of each fold, in order, shape (f, p + 1, p + 1)."""
         without = [self.products[self.fold != one].sum(axis=0) for one in np.unique(self.fold)]
-        object.__setattr__(self, "without_folds", np.array(without).reshape(-1, *self.products.shape[1:]))
+        return np.array(without).reshape(-1, *self.products.shape[1:])
 
     def __len__(self) -> int:
         """Count the blocks."""
@@ -67,10 +66,10 @@ class Blocks:
         self, columns: Sequence[Column], coefficients: Samples, chosen: IndexArray | None = None
     ) -> Samples:
         """Squared residual of every block, or of those chosen, shape (b,)."""
-        places = [*self.places(columns), len(self.names)]
-        products = self.products if chosen is None else self.products[chosen]
+        places = np.array([*self.places(columns), len(self.names)])
+        every = np.arange(len(self)) if chosen is None else chosen
         vector = np.append(-coefficients, 1.0)
-        losses: Samples = products[:, places][:, :, places] @ vector @ vector
+        losses: Samples = self.products[np.ix_(every, places, places)] @ vector @ vector
         return np.maximum(losses, 0.0)
 
 

@@ -6,7 +6,7 @@ all its directions, so that it must not be large along the term alone.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -107,9 +107,7 @@ class SmoothForce:
         self._priors = priors
         self._nonnegative = nonnegative
         shapes = np.stack([rows.columns[name][chosen] for name in waves], axis=1) / sigma[:, None]
-        self._products, self._log_determinants = map(
-            np.array, zip(*self._by_level(shapes, stacked), strict=True)
-        )
+        self._forces = [self._force(shapes * np.sqrt(_spectrum(length)), stacked) for length in LENGTHS]
 
     def beside(self, columns: Sequence[Column]) -> Callable[[Sequence[Column], float], float]:
         """Put a model, by its columns, beside the force.
@@ -133,21 +131,15 @@ class SmoothForce:
 
         return need
 
-    def _by_level(self, shapes: Samples, stacked: Samples) -> Iterator[tuple[Samples, float]]:
-        """Products of columns and target in the metric of V + k² P P', by P' P's eigenvectors (Woodbury).
+    def _force(self, waves: Samples, stacked: Samples) -> tuple[Samples, Samples]:
+        """Take apart what V + k² P P' takes of products, by the eigenvectors of P' P (Woodbury).
 
-        Also its log-determinant over that of V, level by level.
+        Its waves as they are seen in columns and target, shape (w, p + 1), and their sizes, shape (w,), if
+        together they have the size of the noise.
         """
-        for length in LENGTHS:
-            waves = shapes * np.sqrt(_spectrum(length))
-            waves /= math.sqrt(max(float((waves**2).sum()), np.finfo(float).tiny) / self._pieces)
-            sizes, vectors = np.linalg.eigh(waves.T @ waves)
-            sizes = np.maximum(sizes, 0.0)
-            seen = vectors.T @ (waves.T @ stacked)
-            for level in LEVELS:
-                share = level**2 / (1.0 + level**2 * sizes)
-                products = self._whole - (seen.T * share) @ seen
-                yield products, float(np.log1p(level**2 * sizes).sum())
+        waves = waves / math.sqrt(max(float((waves**2).sum()), np.finfo(float).tiny) / self._pieces)
+        sizes, vectors = np.linalg.eigh(waves.T @ waves)
+        return vectors.T @ (waves.T @ stacked), np.maximum(sizes, 0.0)
 
     def _precisions(self, columns: Sequence[Column]) -> Samples:
         """Give 1/D of each column: what is new in a term may explain all that the model leaves.
@@ -184,30 +176,36 @@ class SmoothForce:
         places = np.array([self._place[column] for column in (*columns, *term)])
         bounded = np.array([column in self._nonnegative for column in (*columns, *term)])
         is_own = np.arange(len(places)) >= len(columns)
-        every = np.arange(len(self._products))
-        values, spreads = self._at(every, places, (bounded, is_own), precision[places])
+        bounds = bounded, is_own
+        found = [self._at(force, LEVELS**2, places, bounds, precision[places]) for force in self._forces]
+        values, spreads = (np.concatenate(part) for part in zip(*found, strict=True))
         return float(np.logaddexp.reduce(values)) - math.log(len(values)), float(spreads[np.argmax(values)])
 
     def _at(
         self,
-        levels: IndexArray,
+        force: tuple[Samples, Samples],
+        levels: Samples,
         places: IndexArray,
         bounds: tuple[np.ndarray, np.ndarray],
         precision: Samples,
     ) -> tuple[Samples, Samples]:
-        """Logarithm of the evidence at some levels, and s²; a strength of the model is 0, not negative."""
+        """Logarithm of the evidence at some k², and s²; a strength of the model is 0, not negative."""
         bounded, is_own = bounds
-        products = self._products[levels]
-        matrix = products[:, places[:, None], places] + np.diag(precision)
+        seen, sizes = force
+        with_target = np.append(places, self._whole.shape[0] - 1)
+        seen = seen[:, with_target]
+        share = levels[:, None] / (1.0 + levels[:, None] * sizes)
+        products = self._whole[np.ix_(with_target, with_target)] - (seen.T * share[:, None, :]) @ seen
+        matrix = products[:, :-1, :-1] + np.diag(precision)
         size = np.sqrt(np.diagonal(matrix, axis1=1, axis2=2))
-        right = products[:, places, -1] / size
+        right = products[:, :-1, -1] / size
         scaled = matrix / (size[:, :, None] * size[:, None, :])
         found = np.linalg.solve(scaled, right[:, :, None])[:, :, 0]
         left = np.maximum(products[:, -1, -1] - (right * found).sum(axis=1), 0.0)
         spread = np.maximum(left / self._pieces, 1.0)
         volume = np.linalg.slogdet(scaled)[1] + np.log(size**2 / precision).sum(axis=1)
-        fit = self._pieces * np.log(spread) + left / spread
-        values = -0.5 * (fit + self._log_determinants[levels] + volume)
+        volume += np.log1p(levels[:, None] * sizes).sum(axis=1)
+        values = -0.5 * (self._pieces * np.log(spread) + left / spread + volume)
         beyond = bounded & (found < 0.0)
         for pattern in np.unique(beyond[beyond.any(axis=1)], axis=0):
             alike = (beyond == pattern).all(axis=1)
@@ -216,6 +214,6 @@ class SmoothForce:
                 continue
             kept = ~pattern
             values[alike], spread[alike] = self._at(
-                levels[alike], places[kept], (bounded[kept], is_own[kept]), precision[kept]
+                force, levels[alike], places[kept], (bounded[kept], is_own[kept]), precision[kept]
             )
         return values, spread

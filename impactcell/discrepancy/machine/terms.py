@@ -88,7 +88,7 @@ class Term:
 
 SPEED_SHARES = (0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04, 0.056, 0.08, 0.11, 0.15, 0.21, 0.3)
 """Stribeck velocities over the largest speed: slower than a tenth of it as a rule, and never all of it."""
-LENGTH_SHARES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1)
+LENGTH_SHARES = (0.001, 0.002, 0.003, 0.005, 0.007, 0.01, 0.015, 0.02, 0.03, 0.05, 0.07, 0.1)
 """Presliding lengths over the range of positions: microns to a tenth of the stroke."""
 PERIOD_SHARES = tuple(2.0 / halves for halves in range(3, 49))
 """Periods over the range of positions: one and a half to 24 in it, half of one apart, for a wave that is
