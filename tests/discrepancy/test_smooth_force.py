@@ -219,3 +219,12 @@ def test_a_function_in_one_place_is_told_from_a_smooth_force() -> None:
     assert not found.established
     assert found.law is not None
     assert found.law.place == "law_of_friction_over_position"
+
+
+def test_a_spring_that_saturates_is_not_one_that_softens_by_the_cube() -> None:
+    """A cube closes nine tenths of it, and records need a function of the position much more."""
+    found = investigate_machine(slide(lambda q, v: -1.5 * np.tanh(q / 0.04), 6), SLIDE)
+    assert "hardening_spring" not in found.established
+    assert found.law is not None
+    assert found.law.place == "law_of_force_over_position"
+    assert found.law.fall.after < 1.2

@@ -1,7 +1,8 @@
 """Which term is missing: forward selection by blocks that a model was not fitted to.
 
 A term is taken if it closes more than half of what any model of the catalogue can close, if its gain holds
-from block to block, and if it does about as well as a free form in the same place. At most two are taken.
+from block to block, and if it does about as well as a free form in the same place; and only where records
+need it beside a smooth force of position and speed. At most two are taken.
 """
 
 import math
