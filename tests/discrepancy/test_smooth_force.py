@@ -1,14 +1,18 @@
 """Evidence for a term beside a smooth force, by dense normal distributions, and what is named by it."""
 
 import math
+import re
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
+from impactcell.api.machine_findings import write_machine_findings
 from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.machine import (
+    MIN_NEED,
     BaseModel,
     MachineFinding,
     NumberPrior,
@@ -22,6 +26,7 @@ from impactcell.discrepancy.machine.selection import SMOOTH_FORCE
 from impactcell.discrepancy.machine.smooth_force import NAME, SmoothForce, smooth_force_columns
 from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.weak_form import Column, Rows
+from impactcell.discrepancy.report.machine_page import format_need
 from impactcell.records import Capture, Channel, Samples
 
 OFFSET, FREE, OWN, DRAG = ("offset", 0.0, 0), ("free", 0.0, 0), ("own", 0.0, 0), ("drag", 0.0, 0)
@@ -193,6 +198,19 @@ def test_it_is_the_smooth_force_that_refuses_the_term_that_closes_most(
     step = nothing_but_a_smooth_force.steps[0]
     assert step.reason == SMOOTH_FORCE
     assert step.trials[0].z > 3.0
+    assert max(step.needs.values()) < MIN_NEED
+
+
+def test_the_report_says_how_much_records_need_each_term(
+    nothing_but_a_smooth_force: MachineFinding, tmp_path: Path
+) -> None:
+    step = nothing_but_a_smooth_force.steps[0]
+    write_machine_findings(nothing_but_a_smooth_force, slide(wandering, 4), tmp_path / "found", "slide")
+    told = sorted(map(format_need, step.needs.values()))
+    row = r'<tr[^>]*><td>[^<]*</td>(?:<td class="n">[^<]*</td>){2}<td class="n">([^<]+)</td></tr>'
+    for name, point in (("report.html", "."), ("report.de.html", ",")):
+        page = (tmp_path / "found" / name).read_text(encoding="utf-8")
+        assert sorted(number.replace(point, ".") for number in re.findall(row, page)) == told
 
 
 @pytest.mark.parametrize(

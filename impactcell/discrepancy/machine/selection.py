@@ -7,7 +7,7 @@ need it beside a smooth force of position and speed. At most two are taken.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 from impactcell.discrepancy.machine.base_model import TermChoice
@@ -18,7 +18,6 @@ from impactcell.discrepancy.machine.needs import (
     needs_of_terms,
 )
 from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, PLACES
-from impactcell.discrepancy.machine.smooth_force import SmoothForce
 from impactcell.discrepancy.machine.ties import is_tied, tied_terms
 from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch, Trial, mean_over_error
 from impactcell.discrepancy.machine.weak_form import Column
@@ -74,6 +73,9 @@ class SelectionStep:
         Why nothing was accepted; empty where something was.
     beside : str
         Term beside which alone the accepted one shows; empty where it shows by itself.
+    needs : mapping
+        By term and by free form, how much likelier records are with it than with a smooth force alone
+        (logarithm).
     """
 
     trials: tuple[Trial, ...]
@@ -84,6 +86,7 @@ class SelectionStep:
     tied_with: tuple[str, ...]
     reason: str
     beside: str = ""
+    needs: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def note(self) -> str:
@@ -130,6 +133,11 @@ def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermCh
     best = trials[0]
     reason = _refusal(best, free_gains, max(gain_of_all, best.gain), excess)
     step = SelectionStep(tuple(trials), free_gains, gain_of_all, excess, None, (), reason)
+    of_terms, of_free = {}, {}
+    if search.smooth_force is not None:
+        of_terms = needs_of_terms(search.smooth_force, columns, candidates, search.shapes)
+        of_free = needs_of_free_forms(search.smooth_force, columns)
+        step = replace(step, needs={name: need for name, (need, _) in of_terms.items()} | of_free)
     if reason == NOT_IN_EVERY_BLOCK and best.gain > 0.0 and not best.at_end:
         least = max(MIN_SHARE * excess, MIN_SHARE_OF_ALL * gain_of_all)
         shown = _beside_another(search, (columns, before), trials, least)
@@ -139,27 +147,23 @@ def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermCh
         step = replace(step, accepted=best, tied_with=tied_terms(search, before, best, trials[1:]))
     if search.smooth_force is None:
         return step
-    return _beside_smooth_force(search, search.smooth_force, columns, step)
+    most = max(of_terms, key=lambda name: of_terms[name][0])
+    choice = next(choice for choice in candidates if choice.name == most)
+    trial = search.trial(ChosenTerm(choice, of_terms[most][1]), columns, before)
+    return _beside_smooth_force(step, trial, of_free)
 
 
-def _beside_smooth_force(
-    search: TermSearch, smooth_force: SmoothForce, columns: list[Column], step: SelectionStep
-) -> SelectionStep:
+def _beside_smooth_force(step: SelectionStep, term: Trial, free: Mapping[str, float]) -> SelectionStep:
     """Take the term that the records need most beside a smooth force, if they need any."""
-    choices = {trial.term.choice.name: trial.term.choice for trial in step.trials}
-    needs = needs_of_terms(smooth_force, columns, [*choices.values()], search.shapes)
-    most = max(needs, key=lambda name: needs[name][0])
-    need, shape = needs[most]
-    free = needs_of_free_forms(smooth_force, columns)
-    before = search.losses(columns)
-    term = search.trial(ChosenTerm(choices[most], shape), columns, before)
+    choice = term.term.choice
+    most, need = choice.name, step.needs[choice.name]
     if step.accepted is not None:
         accepted = step.accepted.term.choice
-        own, _ = needs[accepted.name]
+        own = step.needs[accepted.name]
         closes_less = term.gain < MIN_SHARE_OF_NEEDED * step.accepted.gain
         if not _not_needed(own, free, accepted) and (need - own < MIN_NEED or closes_less):
             return step
-    reason = _not_needed(need, free, choices[most]) or _needed_elsewhere(need, free)
+    reason = _not_needed(need, free, choice) or _needed_elsewhere(need, free)
     if reason:
         return replace(step, accepted=None, tied_with=(), reason=step.reason or reason)
     others = [trial for trial in step.trials if trial.term.choice.name != most]
@@ -167,7 +171,9 @@ def _beside_smooth_force(
         step = replace(step, trials=(term, *others), reason=END_OF_RANGE)
     if term.at_end or term.gain <= 0.0:
         return replace(step, accepted=None, tied_with=(), reason=step.reason or SMOOTH_FORCE)
-    tied = [name for name, (other, _) in needs.items() if name != most and need - other < TIED_NEED]
+    tied = [
+        trial.term.choice.name for trial in others if need - step.needs[trial.term.choice.name] < TIED_NEED
+    ]
     return replace(step, accepted=term, tied_with=tuple(tied), reason="")
 
 

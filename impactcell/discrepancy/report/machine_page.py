@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from impactcell.discrepancy.machine import CATALOGUE, VALUES, ChosenTerm, MachineFinding, motions
+from impactcell.discrepancy.machine import CATALOGUE, MIN_NEED, VALUES, ChosenTerm, MachineFinding, motions
 from impactcell.discrepancy.report import german_machine_sentences, machine_sentences
 from impactcell.discrepancy.report.law_figures import function_figure
 from impactcell.discrepancy.report.machine_parameters import SYMBOLS, law_covariate, parameter_rows
@@ -33,9 +33,21 @@ def write_machine_reports(
         said = MACHINE_SENTENCES[language]
         environment = report_environment(said)
         environment.filters["share"] = lambda part, whole, said=said: said.written(format_share(part, whole))
+        environment.filters["need"] = lambda need, said=said: said.written(format_need(need))
         template = environment.get_template(f"{name.replace('report', 'machine')}.j2")
         page = template.render(**machine_page_context(finding, document, source, language))
         (directory / name).write_text(page, encoding="utf-8")
+
+
+def format_need(need: float | None) -> str:
+    """Write a logarithm of how much likelier records are with a term; empty where nobody asked.
+
+    >>> format_need(12.34), format_need(-0.01), format_need(-math.inf), format_need(None)
+    ('12.3', '0.0', '-', '')
+    """
+    if need is None:
+        return ""
+    return "-" if math.isinf(need) else f"{round(need, 1) + 0.0:.1f}"
 
 
 def format_share(part: float, whole: float) -> str:
@@ -94,6 +106,8 @@ def machine_page_context(
         "excess": first.excess if first else 0.0,
         "trials": first.trials[:SHOWN_TRIALS] if first else (),
         "free_gains": dict(first.free_gains) if first else {},
+        "needs": dict(first.needs) if first else {},
+        "min_need": MIN_NEED,
         "gain_of_all": first.gain_of_all if first else 0.0,
         "reason": said.reason(finding.steps[-1].reason if finding.steps else ""),
         "base": [term.choice.name for term in finding.nominal.terms],
