@@ -140,6 +140,25 @@ def test_a_strength_that_may_not_be_negative() -> None:
     assert force.beside([OFFSET, DRAG])([FREE], 1.0) == pytest.approx(force.beside([OFFSET])([FREE], 1.0))
 
 
+def test_a_nuisance_of_which_no_row_knows_anything_changes_nothing() -> None:
+    """As the gain of a force that is zero all along."""
+    rng = np.random.default_rng(2)
+    count = 80
+    x, u = rng.uniform(-1.0, 1.0, (2, count))
+    found = smooth_force_columns(motion(0.2 + 0.5 * x, 2.0 * u), np.sign(u), RANGES)
+    waves = np.stack([values for name, values in found.items() if name[0] == NAME], axis=1)
+    columns = {OFFSET: np.ones(count), FREE: np.zeros(count), DRAG: -u * np.abs(u)}
+    target = columns[DRAG] + 0.1 * rng.normal(size=count)
+    priors = {OFFSET: NumberPrior(0.0, math.inf), FREE: NumberPrior(0.0, math.inf)}
+    force = SmoothForce(
+        rows_of(target, columns, waves, 0.1), np.ones(count, dtype=bool), count, priors, frozenset()
+    )
+    need = force.beside([OFFSET])([DRAG], 1.0)
+    assert need > 3.0
+    assert force.beside([OFFSET, FREE])([DRAG], 1.0) == pytest.approx(need)
+    assert force.beside([OFFSET])([FREE], 1.0) == pytest.approx(0.0)
+
+
 SLIDE = BaseModel(
     response=Response.FORCE,
     inertia=NumberPrior(2.0, 0.1),

@@ -149,7 +149,7 @@ class SmoothForce:
         precision = self._over_left(columns)
         own = [self._place[name] for name in columns]
         precision[own] = self._over_left([*self._priors])[own]
-        size = np.diag(self._whole)
+        size = np.maximum(np.diag(self._whole), np.finfo(float).tiny)
         for name, prior in self._priors.items():
             free = size[self._place[name]] / (NUISANCE_STD**2 * size[-1])
             precision[self._place[name]] = 1.0 / prior.std**2 if math.isfinite(prior.std) else free
@@ -166,7 +166,7 @@ class SmoothForce:
         if beyond:
             return self._over_left([name for name in columns if name not in beyond])
         left = size * np.maximum(1.0 - (scaled[places] * found).sum(axis=0), RIDGE)
-        over: Samples = left[:-1] / left[-1]
+        over: Samples = np.maximum(left[:-1] / max(left[-1], np.finfo(float).tiny), np.finfo(float).tiny)
         return over
 
     def _weigh(
