@@ -61,6 +61,19 @@ def amplitudes(finding: MachineFinding) -> list[tuple[float, float, float]]:
     return [tuple(float(part[place]) for part in (fit.low, fit.coefficients, fit.high)) for place in places]  # type: ignore[misc]
 
 
+@pytest.mark.parametrize(("drag", "times"), [(2e-5, 1.0), (1.5e-4, 4.0)])
+def test_a_drag_is_named_though_the_encoder_explains_more(drag: float, times: float, tmp_path: Path) -> None:
+    """Both are missing, and either holds beside the other: it was `unknown` but for the encoder."""
+    read = bent(swings(drag), times * COSINE, times * SINE)
+    finding = investigate_machine(pendulum(read), base_of(tmp_path, PENDULUM))
+    assert finding.established == ("quadratic_drag",)
+    assert finding.fall.after < finding.fall.before
+    [note] = [note for note in finding.notes if note.startswith("An encoder")]
+    told = re.search(r"turns (\S+) mrad off its centre would explain \d+ % of what remains", note)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(1e3 * times * math.hypot(COSINE, SINE), rel=0.05)
+
+
 def test_an_encoder_off_its_centre_is_told_from_the_machine(tmp_path: Path) -> None:
     finding = investigate_machine(pendulum(bent(swings(4e-4), COSINE, SINE)), base_of(tmp_path, FREE))
     assert finding.established == ("quadratic_drag",)

@@ -42,6 +42,8 @@ INERTIA: Final = {
     Coordinate.ROTATION: ("an", "inertia", "inertia_kg_m2"),
 }
 """What is inert, and its key in a base model."""
+MIN_SHARE_BESIDE = 0.5
+"""Share of what a term closes by itself that it closes beside a number too, where both are missing [1]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,13 +237,17 @@ def told_from_number(
     """Refuse the first step of a selection where a number that is off would explain clearly more, or as much.
 
     The latter only if it is a sensor's, and so small that nobody can exclude it. One that the base model has
-    none of is tied.
+    none of is tied. A term that holds beside the number as well is not refused: both are missing.
     """
     if not steps or (best := steps[0].accepted) is None:
         return steps
     before = search.losses(columns)
     gains = before - search.losses([*columns, *number.columns])
     if not (hold(search, gains, before) and does_as_well(gains, best.gains, MIN_TIED_SHARE)):
+        return steps
+    beside = before - gains
+    own = beside - search.losses([*columns, *number.columns, *best.term.columns])
+    if not number.is_absent and hold(search, own, beside) and own.sum() >= MIN_SHARE_BESIDE * best.gain:
         return steps
     size = math.hypot(*fitted(search.blocks, columns, number, search.priors, search.nonnegative))
     if size <= number.farthest and mean_over_error(gains - best.gains) >= TIE_Z:
