@@ -19,6 +19,8 @@ SHOWN_FORMS = 5
 """Forms alike that the page lists [1]."""
 SHOWN_TRIALS = 15
 """Terms that the page lists [1]."""
+WHOLE = 100.0
+"""Logarithms from which on no decimal says anything [1]."""
 PREFIXES = ("", "m", "µ", "n")
 """Of units, each a thousandth of the one before."""
 MACHINE_SENTENCES: Mapping[str, ModuleType] = {"en": machine_sentences, "de": german_machine_sentences}
@@ -42,12 +44,14 @@ def write_machine_reports(
 def format_need(need: float | None) -> str:
     """Write a logarithm of how much likelier records are with a term; empty where nobody asked.
 
-    >>> format_need(12.34), format_need(-0.01), format_need(-math.inf), format_need(None)
-    ('12.3', '0.0', '-', '')
+    >>> format_need(12.34), format_need(-0.01), format_need(4196.2), format_need(-math.inf), format_need(None)
+    ('12.3', '0.0', '4196', '-', '')
     """
     if need is None:
         return ""
-    return "-" if math.isinf(need) else f"{round(need, 1) + 0.0:.1f}"
+    if math.isinf(need):
+        return "-"
+    return f"{need:.0f}" if abs(need) >= WHOLE else f"{round(need, 1) + 0.0:.1f}"
 
 
 def format_share(part: float, whole: float) -> str:
