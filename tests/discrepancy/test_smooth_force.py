@@ -59,6 +59,15 @@ def rows_of(target: Samples, columns: dict[Column, Samples], waves: Samples, sig
     return Rows(target, every, nothing, np.arange(float(count)), np.full(count, sigma**2), nothing)
 
 
+def visited(seed: int, count: int) -> tuple[np.random.Generator, Samples, Samples, Samples]:
+    """Places and speeds over half their ranges, and the waves there; the generator goes on behind them."""
+    rng = np.random.default_rng(seed)
+    x, u = rng.uniform(-1.0, 1.0, (2, count))
+    found = smooth_force_columns(motion(0.2 + 0.5 * x, 2.0 * u), np.sign(u), RANGES)
+    waves = np.stack([values for name, values in found.items() if name[0] == NAME], axis=1)
+    return rng, x, u, waves
+
+
 def dense(
     target: Samples, columns: Sequence[tuple[Samples, float]], waves: Samples, sigma: float
 ) -> tuple[float, float]:
@@ -89,11 +98,8 @@ def size_of(column: Samples, target: Samples, model: Samples) -> float:
 @pytest.mark.parametrize("strength", [0.0, 0.4, 4.0])
 @pytest.mark.parametrize("stated", [1.0, 0.02], ids=["noise as stated", "noise stated far too small"])
 def test_evidence_is_that_of_dense_normal_distributions(strength: float, stated: float) -> None:
-    rng = np.random.default_rng(8)
     count, sigma = 60, 0.3
-    x, u = rng.uniform(-1.0, 1.0, (2, count))
-    found = smooth_force_columns(motion(0.2 + 0.5 * x, 2.0 * u), np.sign(u), RANGES)
-    waves = np.stack([values for name, values in found.items() if name[0] == NAME], axis=1)
+    rng, x, u, waves = visited(8, count)
     columns = {OFFSET: np.ones(count), FREE: x, OWN: np.cos(5.0 * x), DRAG: -u * np.abs(u)}
     target = 0.7 + strength * columns[DRAG] + 0.5 * np.sin(2.0 * x + u) + 0.4 * columns[OWN]
     target += sigma * rng.normal(size=count)
@@ -122,11 +128,8 @@ def test_evidence_is_that_of_dense_normal_distributions(strength: float, stated:
 
 def test_a_strength_that_may_not_be_negative() -> None:
     """Of the term there is no evidence then; of a model's own it is as without that column."""
-    rng = np.random.default_rng(2)
     count = 80
-    x, u = rng.uniform(-1.0, 1.0, (2, count))
-    found = smooth_force_columns(motion(0.2 + 0.5 * x, 2.0 * u), np.sign(u), RANGES)
-    waves = np.stack([values for name, values in found.items() if name[0] == NAME], axis=1)
+    rng, x, u, waves = visited(2, count)
     columns = {OFFSET: np.ones(count), DRAG: -u * np.abs(u), FREE: np.sign(x) * u}
     target = -3.0 * columns[DRAG] + columns[FREE] + 0.1 * rng.normal(size=count)
     force = SmoothForce(
@@ -142,11 +145,8 @@ def test_a_strength_that_may_not_be_negative() -> None:
 
 def test_a_nuisance_of_which_no_row_knows_anything_changes_nothing() -> None:
     """As the gain of a force that is zero all along."""
-    rng = np.random.default_rng(2)
     count = 80
-    x, u = rng.uniform(-1.0, 1.0, (2, count))
-    found = smooth_force_columns(motion(0.2 + 0.5 * x, 2.0 * u), np.sign(u), RANGES)
-    waves = np.stack([values for name, values in found.items() if name[0] == NAME], axis=1)
+    rng, _, u, waves = visited(2, count)
     columns = {OFFSET: np.ones(count), FREE: np.zeros(count), DRAG: -u * np.abs(u)}
     target = columns[DRAG] + 0.1 * rng.normal(size=count)
     priors = {OFFSET: NumberPrior(0.0, math.inf), FREE: NumberPrior(0.0, math.inf)}

@@ -116,7 +116,7 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNu
     as_well = [[one for one, gains in numbers if _stands_for(one, gains, spline)] for spline in holding]
     if as_well[0]:
         return as_well[0][0]
-    needs = needs_of_free_forms(fits.smooth_force(own), columns)
+    needs = needs_of_free_forms(fits.smooth_force(own).beside(columns))
     refused = ""
     for spline, instead in zip(holding, as_well, strict=True):
         if instead:

@@ -21,6 +21,7 @@ from impactcell.discrepancy.machine.record_constants import without_constants
 from impactcell.discrepancy.machine.regression import (
     PIECES_PER_BLOCK,
     Blocks,
+    LinearFit,
     fit_blocks,
 )
 from impactcell.discrepancy.machine.rival_forms import Freedom
@@ -150,13 +151,16 @@ class MachineFits:
         """Fit a model to the training blocks; with `settle` gravity and delay are found with it."""
         if settle:
             self._settle(terms)
-        columns = self.columns(terms)
-        training, _ = self.blocks(self.rows().only(columns))
-        fit = fit_blocks(training, columns, self.priors, self.nonnegative)
+        fit = self._least_squares(terms)
         delay_s = self.base.delay_s.value
         if DELAY in fit.columns:
             delay_s += float(fit.coefficients[fit.columns.index(DELAY)])
         return FittedModel(self.base, terms, fit, delay_s, self.gravity)
+
+    def _least_squares(self, terms: Iterable[ChosenTerm]) -> LinearFit:
+        columns = self.columns(terms)
+        training, _ = self.blocks(self.rows().only(columns))
+        return fit_blocks(training, columns, self.priors, self.nonnegative)
 
     def _settle(self, terms: tuple[ChosenTerm, ...]) -> None:
         free_gravity = not self.base.gravity_torque.is_held
@@ -164,9 +168,7 @@ class MachineFits:
             if not self.base.delay_s.is_held:
                 self._settle_delay(terms)
             if free_gravity:
-                columns = self.columns(terms)
-                training, _ = self.blocks(self.rows().only(columns))
-                fit = fit_blocks(training, columns, self.priors, self.nonnegative)
+                fit = self._least_squares(terms)
                 place = fit.columns.index(("gravity_torque", 0.0, 0))
                 self.gravity = self.base.gravity_torque.value + float(fit.coefficients[place])
                 self.priors = nuisance_priors(self.base, self.gravity)
@@ -205,8 +207,8 @@ class MachineFits:
         if not self.base.delay_s.is_held:
             self._settle(model.terms)
         own = [term for term in model.terms if not term_of(term.choice).is_friction]
+        of_level, columns = [*self.columns(own), COULOMB], self.columns(model.terms)
         for _ in range(WEIGHINGS):
-            of_level, columns = [*self.columns(own), COULOMB], self.columns(model.terms)
             training, _ = self.blocks(self.rows().only({*of_level, *columns}))
             level = fit_blocks(training, of_level, self.priors, self.nonnegative)
             fit = fit_blocks(training, columns, self.priors, self.nonnegative)

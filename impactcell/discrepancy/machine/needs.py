@@ -7,9 +7,8 @@ import numpy as np
 
 from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS
-from impactcell.discrepancy.machine.smooth_force import SmoothForce
+from impactcell.discrepancy.machine.smooth_force import Need
 from impactcell.discrepancy.machine.trials import ChosenTerm
-from impactcell.discrepancy.machine.weak_form import Column
 
 MIN_NEED = 3.0
 """Logarithm of how much likelier records have to be with a term than with a smooth force alone [1]."""
@@ -20,8 +19,7 @@ FREE_SIZES = (1.0, 0.3, 0.1)
 
 
 def needs_of_terms(
-    smooth_force: SmoothForce,
-    columns: Sequence[Column],
+    need: Need,
     choices: Sequence[TermChoice],
     shapes: Mapping[str, Sequence[float]],
 ) -> dict[str, tuple[float, float]]:
@@ -29,7 +27,6 @@ def needs_of_terms(
 
     Every value of its shape is as likely beforehand as the others.
     """
-    need = smooth_force.beside(columns)
     needs = {}
     for choice in choices:
         grid = shapes[choice.name]
@@ -38,9 +35,8 @@ def needs_of_terms(
     return needs
 
 
-def needs_of_free_forms(smooth_force: SmoothForce, columns: Sequence[Column]) -> dict[str, float]:
+def needs_of_free_forms(need: Need) -> dict[str, float]:
     """By free form, how much likelier records are with it, at corners of some size (logarithm)."""
-    need = smooth_force.beside(columns)
     needs = {}
     for form in FREE_FORMS:
         corners = [(form, 0.0, number) for number in range(KNOTS)]

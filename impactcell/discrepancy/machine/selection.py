@@ -135,9 +135,9 @@ def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermCh
     step = SelectionStep(tuple(trials), free_gains, gain_of_all, excess, None, (), reason)
     of_terms, of_free = {}, {}
     if search.smooth_force is not None:
-        of_terms = needs_of_terms(search.smooth_force, columns, candidates, search.shapes)
-        of_free = needs_of_free_forms(search.smooth_force, columns)
-        step = replace(step, needs={name: need for name, (need, _) in of_terms.items()} | of_free)
+        need = search.smooth_force.beside(columns)
+        of_terms, of_free = needs_of_terms(need, candidates, search.shapes), needs_of_free_forms(need)
+        step = replace(step, needs={name: most for name, (most, _) in of_terms.items()} | of_free)
     if reason == NOT_IN_EVERY_BLOCK and best.gain > 0.0 and not best.at_end:
         least = max(MIN_SHARE * excess, MIN_SHARE_OF_ALL * gain_of_all)
         shown = _beside_another(search, (columns, before), trials, least)
@@ -181,9 +181,9 @@ def _is_needed(search: TermSearch, columns: Sequence[Column], term: ChosenTerm) 
     """Whether records need a term beside a model and a smooth force, and no free form much more."""
     if search.smooth_force is None:
         return True
-    need = search.smooth_force.beside(columns)(term.columns, 1.0)
-    free = needs_of_free_forms(search.smooth_force, columns)
-    return not (_not_needed(need, free, term.choice) or _needed_elsewhere(need, free))
+    need = search.smooth_force.beside(columns)
+    own, free = need(term.columns, 1.0), needs_of_free_forms(need)
+    return not (_not_needed(own, free, term.choice) or _needed_elsewhere(own, free))
 
 
 def _not_needed(need: float, needs_of_free: Mapping[str, float], choice: TermChoice) -> str:

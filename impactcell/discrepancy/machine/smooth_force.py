@@ -30,6 +30,13 @@ LEVELS = np.geomspace(1e-3, 1e3, 25)
 NUISANCE_STD = 10.0
 """Standard deviation of a nuisance that is free, over the size at which it would explain all there is [1]."""
 
+Need = Callable[[Sequence[Column], float], float]
+"""Logarithm of how much likelier rows are with a term beside a model and a smooth force.
+
+By the term's columns and the standard deviation of their strengths, over that at which one explains all that
+the model leaves; -inf where a strength would be negative that may not be.
+"""
+
 
 def smooth_force_columns(motion: MotionState, direction: Samples, ranges: Ranges) -> dict[Column, Samples]:
     """Waves that a smooth force is made of, beside the free forms of `columns_of_corners`; shape (n,) each.
@@ -109,16 +116,8 @@ class SmoothForce:
         shapes = np.stack([rows.columns[name][chosen] for name in waves], axis=1) / sigma[:, None]
         self._forces = [self._force(shapes * np.sqrt(_spectrum(length)), stacked) for length in LENGTHS]
 
-    def beside(self, columns: Sequence[Column]) -> Callable[[Sequence[Column], float], float]:
-        """Put a model, by its columns, beside the force.
-
-        Returns
-        -------
-        callable
-            Logarithm of how much likelier the rows are with a term, by the term's columns and the standard
-            deviation of their strengths, over that at which one explains all that the model leaves; -inf
-            where a strength would be negative that may not be.
-        """
+    def beside(self, columns: Sequence[Column]) -> Need:
+        """Put a model, by its columns, beside the force."""
         scale = self._precisions(columns)
         _, spread = self._weigh(columns, (), scale)
         precision = spread * scale
@@ -144,7 +143,8 @@ class SmoothForce:
     def _precisions(self, columns: Sequence[Column]) -> Samples:
         """Give 1/D of each column: what is new in a term may explain all that the model leaves.
 
-        What is new in a term of the model may explain all that nuisances leave; they are as priors say.
+        What is new in a term of the model may explain all that nuisances leave, and of nuisances D is their
+        prior's variance.
         """
         precision = self._over_left(columns)
         own = [self._place[name] for name in columns]
