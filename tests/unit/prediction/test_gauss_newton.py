@@ -4,11 +4,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
 
 from impactcell.errors import PhysicsError
-from impactcell.prediction.gauss_newton import RAISED_DAMPING, Step, StopRule, fit
+from impactcell.prediction.gauss_newton import RAISED_DAMPING, Step, StopRule, fit, step_within
 
 STOP = StopRule(max_steps=200, length=1e-6, cost=1e-12, refused_cost=1e-10)
 Array = NDArray[np.float64]
@@ -134,3 +136,60 @@ def test_a_minimum_at_a_kink_is_one_though_steps_across_it_do_harm(steepness: fl
     minimum, _, converged = fit(Kink(steepness), np.array([0.1]), stop)
     assert converged
     assert minimum.cost == pytest.approx(0.5 * (0.04 / 0.3) ** 2, abs=stop.cost)
+
+
+@given(seed=st.integers(0, 10_000), size=st.integers(1, 9), width=st.floats(0.05, 20.0))
+def test_a_step_within_bounds_is_where_nothing_is_beyond_them_the_whole_one(
+    seed: int, size: int, width: float
+) -> None:
+    """Else it keeps them, and comes nearer to the minimum within them than the whole step that is cut off."""
+    draw = np.random.default_rng(seed)
+    root = draw.standard_normal((size + 3, size)) * 10.0 ** draw.uniform(-2.0, 2.0, size)
+    curvature, gradient = root.T @ root, root.T @ draw.standard_normal(size + 3)
+    covariance = np.linalg.inv(curvature)
+    whole, stds = -covariance @ gradient, np.sqrt(np.diag(covariance))
+    low, high = -width * stds * draw.uniform(0.0, 1.0, size), width * stds * draw.uniform(0.0, 1.0, size)
+
+    def cost(step: Array) -> float:
+        return 0.5 * float(step @ curvature @ step) + float(gradient @ step)
+
+    step = step_within(whole, covariance, low, high)
+    cut_off = np.clip(whole, low, high)
+    assert np.all((low <= step) & (step <= high))
+    if np.array_equal(cut_off, whole):
+        np.testing.assert_allclose(step, whole, rtol=1e-9)
+    factor = np.linalg.cholesky(curvature).T
+    best = lsq_linear(factor, -np.linalg.solve(factor.T, gradient), (low - 1e-12 * stds, high + 1e-12 * stds))
+    assert cost(step) >= best.cost - 0.5 * float(gradient @ covariance @ gradient) - 1e-6 * abs(cost(whole))
+    held = (step <= low) | (step >= high)
+    free = ~held
+    if free.any() and held.sum() == 1:  # the others' conditional minimum, by solving for them alone
+        pull = gradient[free] + curvature[np.ix_(free, held)] @ step[held]
+        alone = -np.linalg.solve(curvature[np.ix_(free, free)], pull)
+        np.testing.assert_allclose(step[free], alone, rtol=1e-5, atol=1e-6 * float(stds.max()))
+
+
+def test_steps_within_bounds_come_to_an_end_where_cut_off_ones_creep() -> None:
+    """Two numbers that nearly make up for each other, the one of short steps: 40 of them for 4."""
+    rows = np.array([[1.0, 0.99], [0.0, 0.01]]) * 100.0
+    curvature, target = rows.T @ rows, np.array([5.0, -5.0])
+    longest = np.array([0.5, 20.0])
+
+    def descend(how: str) -> tuple[float, int]:
+        theta, steps = np.zeros(2), 0
+        while abs(rows @ (theta - target)).max() > 1e-6 and steps < 60:
+            whole = target - theta
+            if how == "cut off":
+                step = np.clip(whole, -longest, longest)
+            else:
+                step = step_within(whole, np.linalg.inv(curvature), -longest, longest)
+            trial = theta + step
+            if how == "cut off" and np.sum((rows @ (trial - target)) ** 2) > np.sum(
+                (rows @ (theta - target)) ** 2
+            ):
+                trial = theta + 0.1 * step  # as damping shortens what does harm
+            theta, steps = trial, steps + 1
+        return float(abs(rows @ (theta - target)).max()), steps
+
+    assert descend("within")[1] <= 10
+    assert descend("cut off")[1] > 20
