@@ -7,6 +7,9 @@ import numpy as np
 
 from impactcell.campaign import contacts
 from impactcell.campaign.contents import Campaign, Excitation
+from impactcell.numerics.raster import raster_of
+from impactcell.numerics.rest_level import FEWEST, rest_level
+from impactcell.numerics.spikes import noise_of
 from impactcell.records import Capture, Channel, since_contact, with_open_onset
 
 FEWEST_SAMPLES = 10
@@ -28,8 +31,8 @@ STATED_LATE_S = 5e-3
 def from_contact(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     """Give a campaign whose taps begin at first contact, and what was done to them.
 
-    The model of a tap begins at first contact: samples before it are left out. Where the force of most shots
-    begins later than t = 0, contact is put where it begins.
+    The model of a tap begins at first contact: samples before it are left out, and tell where the part lay.
+    Where the force of most shots begins later than t = 0, contact is put where it begins.
 
     Returns
     -------
@@ -118,5 +121,22 @@ def _without_pretrigger(shot: Capture) -> Capture:
         values = channel.values[since]
         return replace(channel, time_s=channel.time_s[since], values=values) if len(values) else channel
 
-    force, position, actuator = map(kept, channels)
+    force, position, actuator = map(kept, (shot.force, _from_rest(shot), shot.actuator))
     return replace(shot, force=force, position=position, actuator=actuator)
+
+
+def _from_rest(shot: Capture) -> Channel | None:
+    """Put the position before contact where the part lay: at 0, or at `start_m` if that is nearer.
+
+    A zero that is 2 µm off bends mu_s by a quarter, and nothing after contact shows it.
+    """
+    position = shot.position
+    if position is None:
+        return None
+    before = position.values[: int(np.searchsorted(position.time_s, 0.0))]
+    if len(before) < FEWEST:
+        return position
+    noise_std = position.noise_std or noise_of(before)
+    level, zero_std = rest_level(before, noise_std, position.resolution or raster_of(position.values) or 0.0)
+    place = shot.start_m if abs(level - shot.start_m) < abs(level) else 0.0
+    return replace(position, values=position.values - (level - place), zero_std=zero_std)

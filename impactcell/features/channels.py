@@ -8,15 +8,16 @@ import numpy as np
 from impactcell.errors import CaptureError, NoBreakawayError
 from impactcell.features.noise import noise_std
 from impactcell.numerics.local_polynomial import channel_statistics, mean, running_mean
+from impactcell.numerics.raster import raster_of
+from impactcell.numerics.rest_level import FEWEST, rest_level
 from impactcell.records import Capture, Channel, Samples, since_contact
 
 CONTACT_SMOOTHING_S = 2e-4
 """Window of the smoothed force: short against a contact of some 17 ms, long against a sample at 1 MHz."""
 MIN_SAMPLES = 8
 """Fewest samples of a channel that any feature can be extracted from: twice those that fix a cubic."""
-FEW, HARDLY_MOVED_S = 5, 2e-4
-"""Samples before contact from which on they tell where the part lay; else the first ones until so long after
-it [s], in which a part struck at 0.1 m/s moves by 20 µm at most."""
+HARDLY_MOVED_S = 2e-4
+"""Time after contact [s] in which a part struck at 0.1 m/s moves by 20 µm at most."""
 OFFSET_STD = 6.0
 """Least offset of a channel that is one, in standard deviations of what it is told by."""
 MIN_MOTION_STD = 6.0
@@ -35,14 +36,11 @@ class CheckedChannel(Channel):
         Largest value.
     plateau : int
         The most samples in a row that stand exactly at `highest`.
-    zero_std : float
-        Standard deviation of its zero, where that was taken from the record; 0 where it is as recorded.
     """
 
     sigma: float = math.nan
     highest: float = math.nan
     plateau: int = 0
-    zero_std: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +91,7 @@ def check_channel(channel: Channel | None, name: str) -> CheckedChannel:
         raise CaptureError(f"the {name} is constant at {channel.values[0]:.6g}")
     return CheckedChannel(
         channel.time_s, channel.values, channel.noise_std, channel.full_scale, channel.resolution,
-        sigma=noise_std(channel), highest=highest, plateau=plateau,
+        zero_std=channel.zero_std, sigma=noise_std(channel), highest=highest, plateau=plateau,
     )  # fmt: skip
 
 
@@ -117,13 +115,19 @@ def displacement(capture: Capture) -> CheckedChannel:
 
 
 def _from_rest(position: CheckedChannel, capture: Capture) -> CheckedChannel:
-    """Count from where the part lay, if the record stands elsewhere while it hardly can have moved.
+    """Count from where the part lay: by the samples before contact, where there are some.
 
-    Until t a part of mass m goes no farther than F t² / (2 m), with F its largest force, nor than v t of an
-    actuator of velocity v.
+    Else by the first ones, if the record stands elsewhere while the part hardly can have moved: until t a
+    part of mass m goes no farther than F t² / (2 m), with F its largest force, nor than v t of an actuator of
+    velocity v. A zero that is 2 µm off bends mu_s by a quarter.
     """
+    if position.zero_std > 0.0:
+        return position
     before = int(np.searchsorted(position.time_s, 0.0, "right"))
-    count = before if before >= FEW else int(np.searchsorted(position.time_s[:FEW], HARDLY_MOVED_S, "right"))
+    if before >= FEWEST:
+        level, zero_std = rest_level(position.values[:before], position.sigma, step_of(position))
+        return _counted_from(position, level, zero_std)
+    count = int(np.searchsorted(position.time_s[:FEWEST], HARDLY_MOVED_S, "right"))
     resting = position.values[: max(count, 1)]
     level, until_s = float(np.median(resting)), max(float(position.time_s[len(resting) - 1]), 0.0)
     ways = [capture.velocity_m_s * until_s]
@@ -132,9 +136,17 @@ def _from_rest(position: CheckedChannel, capture: Capture) -> CheckedChannel:
     way = min((one for one in ways if one > 0.0), default=0.0)
     if abs(level) <= OFFSET_STD * position.sigma + way:
         return position
-    zero_std = math.hypot(position.sigma / math.sqrt(len(resting)), way)
+    return _counted_from(position, level, math.hypot(position.sigma / math.sqrt(len(resting)), way))
+
+
+def _counted_from(position: CheckedChannel, level: float, zero_std: float) -> CheckedChannel:
     values = position.values - level
     return replace(position, values=values, highest=position.highest - level, zero_std=zero_std)
+
+
+def step_of(channel: Channel) -> float:
+    """Give the step of the raster on which a channel's values lie; 0 where on none that shows."""
+    return channel.resolution or raster_of(channel.values) or 0.0
 
 
 def smoothing_width(channel: Channel) -> int:

@@ -26,6 +26,9 @@ JUMP_SPAN_S = 1e-4
 """How far to either side of a jump of the force, s, where a part is met again, blocks say nothing: a few
 times how well it is known when that is. A sample that the jump crosses is off by a hundred times the noise,
 and its slope is that of a wall."""
+MAX_CHANGING, LEAST_RUN = 0.75, 2
+"""Share of samples that differ from the one before above which a raster hides in the noise, and samples on
+one step from which on they count as one. Our choice."""
 LEFT_OUT = 1e3
 """Factor of the standard deviation of blocks that are left out of a fit."""
 
@@ -81,6 +84,7 @@ def linearised_model(features: Features, plant: Plant) -> LinearisedModel:
         force = replace(force, std=force.std * factors)
     moved = _surely_touching(whole_position, onset_std_s)
     position = average_blocks(moved, POSITION_BLOCK_S, FINE_POSITION_BLOCK_S, spans)
+    position = replace(position, std=position.std * _std_factors_of_runs(moved, position.time_s))
     zero_std = whole_force.zero_std, whole_position.zero_std
     return LinearisedModel(plant, tap, force, position, recorder_std, zero_std)
 
@@ -105,6 +109,19 @@ def _surely_touching(channel: CheckedChannel, onset_std_s: float) -> CheckedChan
         return channel
     since = slice(int(np.searchsorted(channel.time_s, LATEST_ONSET * onset_std_s, "right")), None)
     return replace(channel, time_s=channel.time_s[since], values=channel.values[since])
+
+
+def _std_factors_of_runs(channel: CheckedChannel, times: Samples) -> Samples:
+    """Factor by which a raster makes blocks uncertain: what stands on one step is rounded by the same.
+
+    A run of n equal samples tells no more than one of them, with the rounding error of one.
+    """
+    is_new = np.diff(channel.values) != 0.0
+    if float(np.mean(is_new)) > MAX_CHANGING:
+        return np.ones_like(times)
+    run = np.append(0, np.cumsum(is_new))
+    length = np.bincount(run)[run[np.searchsorted(channel.time_s, times).clip(max=len(run) - 1)]]
+    return np.where(length >= LEAST_RUN, np.sqrt(length), 1.0)
 
 
 def _std_factors_at_jumps(times: Samples, jumps: list[float], within_s: float) -> Samples:

@@ -47,6 +47,8 @@ class Channel:
         A position that is the sum of a recorded speed, whose noise adds up in it.
     speed_noise_std : float or None
         Standard deviation of that speed's white noise; None where it is not known.
+    zero_std : float
+        Standard deviation of its zero, where that was taken from the record; 0 where it is as recorded.
     """
 
     time_s: Samples
@@ -56,6 +58,7 @@ class Channel:
     resolution: float | None = None
     summed_up: bool = False
     speed_noise_std: float | None = None
+    zero_std: float = 0.0
 
 
 def since_contact(time_s: Samples) -> slice:
