@@ -21,6 +21,8 @@ START_STD = 10.0
 zero."""
 NO_TRIGGER = "none"
 """Said of records whose t = 0 is the first contact already."""
+MISSED = "the tap may have missed"
+"""Why a force may show no contact."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,30 +40,38 @@ class _TapRecord:
 
 
 def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], list[str]]:
-    """Give the taps of records as captures, and what was decided.
+    """Give the taps of records as captures, and what was decided; a record without a contact is left out.
 
     Raises
     ------
     MeasurementError
-        A record shows no contact, or the velocity of the actuator is not known.
+        No record shows a contact, or the velocity of the actuator is not known.
     """
     notes: list[str] = []
     faults: list[str] = []
     signed = _signed(records, given, notes)
     taps: list[_TapRecord] = []
     left_out: list[str] = []
+    struck: list[Record] = []
+    missed: list[Record] = []
     for record in signed:
-        taps += _taps(record, given, faults, left_out)
+        onsets = _onsets(record, given)
+        if onsets is not None and not onsets:
+            missed.append(record)
+            continue
+        struck.append(record)
+        taps += _taps(record, onsets, given, faults, left_out)
+    faults += [] if struck else [_without_contact(record, given) for record in missed]
     raise_faults(faults)
-    if len(taps) > len(records):
-        told = "1 record" if len(records) == 1 else f"{len(records)} records"
+    if len(taps) > len(struck):
+        told = "1 record" if len(struck) == 1 else f"{len(struck)} records"
         notes.append(f"{told} cut into {len(taps)} taps where the force begins anew")
     notes += _of_actuator(taps)
     if left_out:
-        told = (
-            f"in {Path(left_out[0]).name}" if len(left_out) == 1 else f"the first in {Path(left_out[0]).name}"
-        )
-        notes.append(f"taps left out whose beginning was not recorded: {len(left_out)}, {told}")
+        notes.append(f"taps left out whose beginning was not recorded: {_counted(left_out)}")
+    if missed:
+        told = _counted([record.place for record in missed])
+        notes.append(f"records left out whose force shows no contact{_sought(given)}: {told}: {MISSED}")
     if not any(ColumnMeaning.POSITION in record.values for record in records):
         notes.append(
             "no position was recorded: such taps tell mu_s by peak force and the model of a cell, and no "
@@ -84,19 +94,48 @@ def _signed(records: Sequence[Record], given: Given, notes: list[str]) -> list[R
     return turned
 
 
-def _taps(record: Record, given: Given, faults: list[str], left_out: list[str]) -> list[_TapRecord]:
-    time, force = record.times[ColumnMeaning.FORCE], record.values[ColumnMeaning.FORCE]
+def _counted(places: Sequence[str]) -> str:
+    """Tell how many places there are, and the file of the first."""
+    first = Path(places[0]).name
+    return f"1, in {first}" if len(places) == 1 else f"{len(places)}, the first in {first}"
+
+
+def _onsets(record: Record, given: Given) -> list[int] | None:
+    """Give the samples at which contacts begin; None where t = 0 is said to be the contact."""
     if given.trigger == NO_TRIGGER:
-        return _with_velocity([(record, None)], given, faults)
-    threshold = given.trigger if isinstance(given.trigger, float) else None
-    baseline = contacts.baseline_of(force, threshold)
-    onsets = contacts.contact_onsets(time, force, baseline) if np.ptp(force) > 0.0 else []
-    if not onsets:
-        faults.append(
-            f"{record.place}: the force shows no contact (largest {force.max():.3g} N above noise of "
-            f"{baseline.noise_std:.2g} N); give its threshold with --trigger, or --excitation driven"
-        )
+        return None
+    time, force = record.times[ColumnMeaning.FORCE], record.values[ColumnMeaning.FORCE]
+    if np.ptp(force) == 0.0:
         return []
+    return contacts.contact_onsets(time, force, contacts.baseline_of(force, _threshold(given)))
+
+
+def _threshold(given: Given) -> float | None:
+    return given.trigger if isinstance(given.trigger, float) else None
+
+
+def _sought(given: Given) -> str:
+    """Name the force of contact, where it was given."""
+    threshold = _threshold(given)
+    return "" if threshold is None else f" of {threshold:g} N"
+
+
+def _without_contact(record: Record, given: Given) -> str:
+    force = record.values[ColumnMeaning.FORCE]
+    noise = contacts.baseline_of(force).noise_std
+    way_out = "" if _sought(given) else "give its threshold with --trigger, "
+    return (
+        f"{record.place}: the force shows no contact{_sought(given)} (largest {force.max():.3g} N above "
+        f"noise of {noise:.2g} N): {MISSED}; leave the record out, {way_out}or say --excitation driven"
+    )
+
+
+def _taps(
+    record: Record, onsets: Sequence[int] | None, given: Given, faults: list[str], left_out: list[str]
+) -> list[_TapRecord]:
+    time = record.times[ColumnMeaning.FORCE]
+    if onsets is None:
+        return _with_velocity([(record, None)], given, faults)
     if len(onsets) == 1:
         begins_at_contact = onsets[0] == 0 and 0.0 <= time[0] < contacts.REST_S
         return _with_velocity([(record, None if begins_at_contact else onsets[0])], given, faults)

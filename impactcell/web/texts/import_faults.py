@@ -173,11 +173,21 @@ FAULTS: Final = (
         "angeben",
     ),
     FaultPattern(
-        r"the force shows no contact \(largest (?P<largest>.+) N above noise of (?P<noise>.+) N\); .*",
-        "the force shows no contact (largest {largest} N above noise of {noise} N); give the force "
-        "at contact in the form below",
-        "die Kraft zeigt keine Berührung (höchstens {largest} N über einem Rauschen von {noise} N); "
-        "unten im Formular die Kraft bei Berührung angeben",
+        r"the force shows no contact \(largest (?P<largest>.+) N above noise of (?P<noise>.+) N\): .*",
+        "the force shows no contact (largest {largest} N above noise of {noise} N): the tap may have missed; "
+        "leave the record out, or give the force at contact in the form below",
+        "die Kraft zeigt keine Berührung (höchstens {largest} N über einem Rauschen von {noise} N): der Stoß "
+        "ging vielleicht daneben; die Aufzeichnung weglassen oder unten im Formular die Kraft bei Berührung "
+        "angeben",
+    ),
+    FaultPattern(
+        r"the force shows no contact of (?P<sought>.+) N \(largest (?P<largest>.+) N above noise of "
+        r"(?P<noise>.+) N\): .*",
+        "the force shows no contact of {sought} N, as given in the form below (largest {largest} N above "
+        "noise of {noise} N): the tap may have missed; leave the record out",
+        "die Kraft zeigt keine Berührung mit {sought} N, wie unten im Formular angegeben (höchstens "
+        "{largest} N über einem Rauschen von {noise} N): der Stoß ging vielleicht daneben; die "
+        "Aufzeichnung weglassen",
     ),
     FaultPattern(
         r"the velocity of the actuator is not known(?P<why>.*); name the column .*",

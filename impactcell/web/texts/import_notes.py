@@ -51,6 +51,13 @@ GERMAN: Final = {
         r"weggelassene Stöße, deren Beginn nicht aufgezeichnet wurde: \1, in \2",
     r"taps left out whose beginning was not recorded: (\d+), the first in (.+)":
         r"weggelassene Stöße, deren Beginn nicht aufgezeichnet wurde: \1, zuerst in \2",
+    r"records left out whose force shows no contact(?: of \S+ N)?: (\d+), in (.+): the tap may have missed":
+        r"weggelassene Aufzeichnungen, deren Kraft keine Berührung zeigt: \1, in \2: der Stoß ging "
+        "vielleicht daneben",
+    r"records left out whose force shows no contact(?: of \S+ N)?: (\d+), the first in (.+): the tap may "
+    r"have missed":
+        r"weggelassene Aufzeichnungen, deren Kraft keine Berührung zeigt: \1, zuerst in \2: der Stoß ging "
+        "vielleicht daneben",
     r"no samples before contact: the records' own t = 0 is taken":
         "keine Messwerte vor dem Kontakt: es gilt das t = 0 der Aufzeichnungen",
     r"no stroke is stated: the actuator is taken to halt as it loses contact":
