@@ -9,6 +9,7 @@ import numpy as np
 
 from impactcell.campaign import contacts
 from impactcell.measurements.captures import channel_of, described, direction_of, shot_numbers
+from impactcell.measurements.compression import in_compression
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.given_values import Given
 from impactcell.measurements.measured_records import Record
@@ -49,12 +50,11 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
     """
     notes: list[str] = []
     faults: list[str] = []
-    signed = _signed(records, given, notes)
     taps: list[_TapRecord] = []
     left_out: list[str] = []
     struck: list[Record] = []
     missed: list[Record] = []
-    for record in signed:
+    for record in in_compression(records, given, notes, faults):
         onsets = _onsets(record, given)
         if onsets is not None and not onsets:
             missed.append(record)
@@ -79,19 +79,6 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
         )
     numbers, starts = shot_numbers([tap.record for tap in taps]), _contact_times(taps, notes)
     return [_capture(*one, given) for one in zip(numbers, taps, starts, strict=True)], notes
-
-
-def _signed(records: Sequence[Record], given: Given, notes: list[str]) -> list[Record]:
-    """Turn the force so that compression is positive."""
-    signs = [contacts.pulse_sign(record.values[ColumnMeaning.FORCE]) for record in records]
-    sign = 1 if sum(signs) >= 0 or ColumnMeaning.FORCE in given.signs else -1
-    if sign < 0:
-        notes.append("force turned: it was negative in compression (--sign force=1 leaves it)")
-    turned = []
-    for record in records:
-        force = sign * record.values[ColumnMeaning.FORCE]
-        turned.append(replace(record, values={**record.values, ColumnMeaning.FORCE: force}))
-    return turned
 
 
 def _counted(places: Sequence[str]) -> str:

@@ -7,6 +7,7 @@ from impactcell.german.data_faults import german_message
 from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, with_decimal_commas
 from impactcell.web.texts.fault_pattern import COLUMN, PLACE, FaultPattern
 from impactcell.web.texts.faults_between_files import FAULTS_BETWEEN_FILES
+from impactcell.web.texts.faults_of_taps import FAULTS_OF_TAPS
 from impactcell.web.texts.faults_of_times import FAULTS_OF_TIMES
 from impactcell.web.texts.import_notes import page_note
 from impactcell.web.texts.service_faults import SERVICE_FAULTS
@@ -15,6 +16,7 @@ FAULTS: Final = (
     *SERVICE_FAULTS,
     *FAULTS_BETWEEN_FILES,
     *FAULTS_OF_TIMES,
+    *FAULTS_OF_TAPS,
     FaultPattern(
         r"(?P<cells>\d+) cells where the header has (?P<names>\d+)",
         "{cells} cells where the header has {names}",
@@ -171,30 +173,6 @@ FAULTS: Final = (
         "below",
         "die Zeilen neben den Spalten sagen {meaning} {one} und {other}; unten im Formular für alle Stöße "
         "angeben",
-    ),
-    FaultPattern(
-        r"the force shows no contact \(largest (?P<largest>.+) N above noise of (?P<noise>.+) N\): .*",
-        "the force shows no contact (largest {largest} N above noise of {noise} N): the tap may have missed; "
-        "leave the record out, or give the force at contact in the form below",
-        "die Kraft zeigt keine Berührung (höchstens {largest} N über einem Rauschen von {noise} N): der Stoß "
-        "ging vielleicht daneben; die Aufzeichnung weglassen oder unten im Formular die Kraft bei Berührung "
-        "angeben",
-    ),
-    FaultPattern(
-        r"the force shows no contact of (?P<sought>.+) N \(largest (?P<largest>.+) N above noise of "
-        r"(?P<noise>.+) N\): .*",
-        "the force shows no contact of {sought} N, as given in the form below (largest {largest} N above "
-        "noise of {noise} N): the tap may have missed; leave the record out",
-        "die Kraft zeigt keine Berührung mit {sought} N, wie unten im Formular angegeben (höchstens "
-        "{largest} N über einem Rauschen von {noise} N): der Stoß ging vielleicht daneben; die "
-        "Aufzeichnung weglassen",
-    ),
-    FaultPattern(
-        r"the velocity of the actuator is not known(?P<why>.*); name the column .*",
-        "the velocity of the actuator is not known{why}; choose the column of the commanded one in "
-        "the form below, or give it for all shots there",
-        "die Geschwindigkeit des Antriebs ist nicht bekannt{why}; unten im Formular die Spalte der "
-        "befohlenen wählen oder sie dort für alle Stöße angeben",
     ),
     FaultPattern(
         r"(?P<units>.+): some are of a rotation and some of a translation; .*",

@@ -27,6 +27,12 @@ GERMAN: Final = {
     r"velocity (\S+) to (\S+) mm/min taken from the actuator channel about contact, in (\d+) taps?":
         r"Geschwindigkeit \1 bis \2 mm/min, aus dem Weg des Aktors um den Kontakt (Stöße: \3)",
     r"force turned: it was negative in compression": "Kraft umgekehrt: sie war bei Druck negativ",
+    r"force turned in (\d+) of (\d+) contacts: its sign goes with the direction of motion":
+        r"Kraft bei \1 von \2 Berührungen umgekehrt: ihr Vorzeichen geht mit der Bewegungsrichtung",
+    r"force that pulls, by the sign that was given, in 1 record, (.+)":
+        r"Kraft, die mit dem angegebenen Vorzeichen zieht, in 1 Aufzeichnung, \1",
+    r"force that pulls, by the sign that was given, in (\d+) records, the first (.+)":
+        r"Kraft, die mit dem angegebenen Vorzeichen zieht, in \1 Aufzeichnungen, zuerst \2",
     r"position summed up from the speed (['\"])(.+)\1, from 0 at the first sample of each record: where that "
     r"was is not known":
         r"Position aus der Geschwindigkeit „\2“ aufsummiert, ab 0 beim ersten Messwert jeder Aufzeichnung: "

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from impactcell.measurements import MeasuredColumn, Table
 from tests.taps import Tap
 
 RATE_HZ = 10_000.0
@@ -39,6 +40,12 @@ def sampled(
         force + rng.normal(0.0, 0.4, time.size),
         PLACE_M + position + rng.normal(0.0, 1.5e-6, time.size),
     )
+
+
+def recorded(name: str, columns: Sequence[np.ndarray]) -> Table:
+    """Give the table of a file that has time [s], force [N] and position [m]."""
+    names = (("Time", "s"), ("Force", "N"), ("Position", "m"))
+    return Table(name, tuple(MeasuredColumn(*of, values) for of, values in zip(names, columns, strict=True)))
 
 
 def write_logger_file(path: Path, tap: Tap, rng: np.random.Generator) -> None:

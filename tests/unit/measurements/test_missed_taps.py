@@ -1,16 +1,14 @@
 """Records of taps that missed: the force shows no contact."""
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 
 from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError
-from impactcell.measurements import Given, Imported, MeasuredColumn, Table, guess, make_campaign
+from impactcell.measurements import Given, Imported, guess, make_campaign
 from impactcell.web.texts.import_faults import page_fault
 from impactcell.web.texts.import_notes import page_note
-from tests.unit.measurements.records import PLACE_M, RATE_HZ, sampled, taps
+from tests.unit.measurements.records import PLACE_M, RATE_HZ, recorded, sampled, taps
 
 CONSTANTS = {"mass": 18.9, "velocity": 0.05, "stroke": 1.5e-3}
 STRUCK = taps((3000,), (18.9,))
@@ -21,7 +19,7 @@ def imported(struck: int, missed: int, trigger: float | None = None) -> Imported
     rng = np.random.default_rng(1)
     records = [sampled(STRUCK[number % 2], rng) for number in range(struck)]
     records += [nothing(rng) for _ in range(missed)]
-    tables = [table(f"data/{number}.csv", record) for number, record in enumerate(records, 1)]
+    tables = [recorded(f"data/{number}.csv", record) for number, record in enumerate(records, 1)]
     given = Given(constants=CONSTANTS, excitation=Excitation.TAP, trigger=trigger)
     return make_campaign(tables, guess(tables, given))
 
@@ -29,11 +27,6 @@ def imported(struck: int, missed: int, trigger: float | None = None) -> Imported
 def nothing(rng: np.random.Generator) -> tuple[np.ndarray, ...]:
     noise = rng.normal(size=(2, 1200))
     return np.arange(1200) / RATE_HZ, 0.4 * noise[0], PLACE_M + 1.5e-6 * noise[1]
-
-
-def table(name: str, columns: Sequence[np.ndarray]) -> Table:
-    names = (("Time", "s"), ("Force", "N"), ("Position", "m"))
-    return Table(name, tuple(MeasuredColumn(*of, values) for of, values in zip(names, columns, strict=True)))
 
 
 @pytest.mark.parametrize(
