@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from impactcell.campaign import Campaign, Coordinate, Excitation
+from impactcell.campaign import Campaign, Coordinate, Excitation, from_contact
 from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements import (
     Dialect,
@@ -108,7 +108,7 @@ def _doubted_units(campaign: Campaign) -> list[str]:
     if campaign.coordinate is Coordinate.ROTATION or campaign.excitation is Excitation.DRIVEN:
         return []
     try:
-        check_campaign_units(campaign)
+        check_campaign_units(from_contact(campaign)[0])
     except CampaignError as error:
         return [f"{error}; it will be refused as it stands (--unit NAME=UNIT says another)"]
     return []

@@ -13,6 +13,7 @@ from impactcell.measurements.compression import in_compression
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.given_values import Given
 from impactcell.measurements.measured_records import Record
+from impactcell.measurements.put_back import from_its_place
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.numerics.spikes import noise_of
 from impactcell.records import MM_PER_MIN, Capture, Channel, Samples
@@ -67,6 +68,7 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
         told = "1 record" if len(struck) == 1 else f"{len(struck)} records"
         notes.append(f"{told} cut into {len(taps)} taps where the force begins anew")
     notes += _of_actuator(taps)
+    taps = _from_their_places(taps, notes)
     if left_out:
         notes.append(f"taps left out whose beginning was not recorded: {_counted(left_out)}")
     if missed:
@@ -203,6 +205,15 @@ def _slope(record: Record, onset: int | None) -> float:
     if near.sum() < 4:
         return math.nan
     return float(np.polyfit(time[near] - t0, position[near], 1)[0])
+
+
+def _from_their_places(taps: Sequence[_TapRecord], notes: list[str]) -> list[_TapRecord]:
+    """Leave out positions of before a part was put to where it is struck, and tell of it."""
+    kept = [replace(tap, record=from_its_place(tap.record, tap.onset)) for tap in taps]
+    if changed := sum(before.record is not after.record for before, after in zip(taps, kept, strict=True)):
+        told = "1 tap" if changed == 1 else f"{changed} taps"
+        notes.append(f"positions left out of before the part was put to where it is struck, in {told}")
+    return kept
 
 
 def _contact_times(taps: Sequence[_TapRecord], notes: list[str]) -> list[float]:

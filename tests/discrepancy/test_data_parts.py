@@ -21,6 +21,7 @@ from impactcell.discrepancy.laws.law import COVARIATE_WORDS
 from impactcell.discrepancy.report import german_sentences
 from impactcell.errors import CampaignError
 from impactcell.records import Capture, Channel
+from impactcell.web.texts.import_notes import page_note
 from tests.discrepancy.study import Job, campaign, name_effects, quick_campaign
 
 
@@ -238,6 +239,16 @@ def test_a_wrong_unit_is_told_with_the_factor_between_units(value: float, column
     with pytest.raises(CampaignError) as fault:
         check_units([{ratio: value}])
     assert str(fault.value).endswith(f"(off by a factor of about {factor})")
+
+
+def test_no_factor_is_told_where_a_ratio_is_nothing() -> None:
+    ratio = PlausibleRatio(0.05, 20.0, "a ratio", "position_m or velocity_mm_per_min")
+    with pytest.raises(CampaignError) as fault:
+        check_units([{ratio: 0.0}])
+    told = "a ratio is 0, where about 1 is possible: check the unit of position_m or velocity_mm_per_min"
+    assert str(fault.value) == told
+    german = page_note(f"{told}; it will be refused as it stands (--unit NAME=UNIT says another)", "de")[1]
+    assert german.startswith("Einheit prüfen: position_m oder velocity_mm_per_min (")
 
 
 def test_a_quarter_of_every_setting_is_held_out() -> None:

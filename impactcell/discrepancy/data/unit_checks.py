@@ -56,11 +56,11 @@ def check_units(ratios_of_shots: Iterable[Mapping[PlausibleRatio, float]]) -> No
     for ratio, of_shots in values.items():
         median = float(np.median(of_shots))
         if not ratio.low < median < ratio.high:
-            message = (
-                f"{ratio.name} is {median:.3g}, where about 1 is possible: check the unit of {ratio.columns} "
-                f"(off by a factor of about {likely_factor(median, ratio.columns)})"
+            told = (
+                f"{ratio.name} is {median:.3g}, where about 1 is possible: check the unit of {ratio.columns}"
             )
-            raise CampaignError(message)
+            factor = f" (off by a factor of about {likely_factor(median, ratio.columns)})" if median else ""
+            raise CampaignError(f"{told}{factor}")
 
 
 def likely_factor(value: float, columns: str) -> str:

@@ -64,6 +64,8 @@ GERMAN: Final = {
     r"have missed":
         r"weggelassene Aufzeichnungen, deren Kraft keine Berührung zeigt: \1, zuerst in \2: der Stoß ging "
         "vielleicht daneben",
+    r"positions left out of before the part was put to where it is struck, in (\d+) taps?":
+        r"weggelassene Positionen von vor dem Zurücklegen des Teils (Stöße: \1)",
     r"no samples before contact: the records' own t = 0 is taken":
         "keine Messwerte vor dem Kontakt: es gilt das t = 0 der Aufzeichnungen",
     r"no stroke is stated: the actuator is taken to halt as it loses contact":
@@ -79,6 +81,8 @@ GERMAN: Final = {
     r"(.+) is (\S+), where about 1 is possible: check the unit of (.+) or (\S+) "
     r"\(off by a factor of about (\S+)\); it will be refused as it stands":
         r"Einheit prüfen: \3 oder \4 (um etwa den Faktor \5 daneben); so wird es später abgelehnt",
+    r"(.+) is 0, where about 1 is possible: check the unit of (.+) or (\S+); it will be refused as it stands":
+        r"Einheit prüfen: \2 oder \3 (die Kampagne zeigt keine Bewegung); so wird es später abgelehnt",
     r"(.+): has the samples of (.+), noise and all, and counts as shots of its own; .*":
         r"\1: hat die Messwerte von \2, samt Rauschen, und zählt als eigene Stöße; ist es eine Kopie, "
         "weglassen",
