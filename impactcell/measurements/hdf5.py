@@ -1,6 +1,6 @@
 """Reads HDF5 files, and MATLAB files of version 7.3, which are such, with h5py."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,13 @@ from impactcell.measurements.arrays import tables_of
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.natural_order import natural_key
 from impactcell.measurements.optional import damage_told, reader_library
+from impactcell.measurements.sampling_step import says_step
 from impactcell.measurements.table import Table
+
+Column = tuple[str, str | None, Any]
+"""Name, unit and values."""
+Clock = tuple[tuple[str, str], ...]
+"""Attribute that says how often a data set was sampled, and its value; empty where none does."""
 
 MAX_DEPTH = 8
 """Groups within groups that are looked into."""
@@ -52,7 +58,7 @@ def _read_group(
 ) -> int:
     """Read the tables of a group and of those within; the cells read so far."""
     depth, cells = spent
-    columns: list[tuple[str, str | None, Any]] = []
+    columns: list[tuple[Clock, Column]] = []
     told: list[str] = []
     names = [
         name
@@ -68,11 +74,33 @@ def _read_group(
                 cells = _read_group(h5py, item, path, limits, (depth + 1, cells), said, tables)
         elif isinstance(item, h5py.Dataset):
             cells = _count(item, path, limits, cells)
-            columns += _columns(h5py, name, item, path, told)
+            clock = _clock(item)
+            columns += [(clock, column) for column in _columns(h5py, name, item, path, told)]
     limits.check_shape(f"{path}: {group.name}", 0, len(columns))
     note = "HDF5" if group.name == "/" else f"HDF5 group {group.name}"
-    tables += tables_of(str(path), columns, group.name.strip("/"), said, "".join([note, *told]))
+    for clock, same in _by_clock(columns):
+        of_these = dict(clock) | {key: value for key, value in said.items() if key not in dict(clock)}
+        tables += tables_of(str(path), same, group.name.strip("/"), of_these, "".join([note, *told]))
     return cells
+
+
+def _clock(item: Any) -> Clock:
+    """Give the attribute of a data set that says its rate or step, if one does."""
+    said = ((key, str(_plain(value))) for key, value in item.attrs.items())
+    return next((((key, text),) for key, text in said if says_step(key, text)), ())
+
+
+def _by_clock(columns: list[tuple[Clock, Column]]) -> Iterator[tuple[Clock, list[Column]]]:
+    """Give columns of one length that share their rate; those that say none go with the others' only one."""
+    for length in dict.fromkeys(len(column[2]) for _, column in columns):
+        same = [(clock, column) for clock, column in columns if len(column[2]) == length]
+        clocks = dict.fromkeys(clock for clock, _ in same)
+        told = [clock for clock in clocks if clock]
+        if len(told) < 2:
+            yield told[0] if told else (), [column for _, column in same]
+        else:
+            for clock in clocks:
+                yield clock, [column for own, column in same if own == clock]
 
 
 def _said_in(h5py: Any, group: Any, items: Mapping[str, Any]) -> dict[str, object]:
@@ -105,9 +133,7 @@ def _is_plain(h5py: Any, item: Any) -> bool:
     return (is_text or not item.dtype.hasobject) and "MATLAB_empty" not in item.attrs
 
 
-def _columns(
-    h5py: Any, name: str, item: Any, path: Path, told: list[str]
-) -> list[tuple[str, str | None, Any]]:
+def _columns(h5py: Any, name: str, item: Any, path: Path, told: list[str]) -> list[Column]:
     unit = _unit_of(item)
     if not item.size or item.ndim not in (1, 2) or not _is_plain(h5py, item):
         return []

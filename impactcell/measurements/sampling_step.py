@@ -26,6 +26,11 @@ def sampling_step_s(table: Table, constants: Mapping[str, float]) -> float | Non
     return None
 
 
+def says_step(key: str, text: str) -> bool:
+    """Whether what a file says is its rate or its step."""
+    return _step(key, text, ".") is not None
+
+
 def doubt_of_step(table: Table) -> str:
     """Say which line of a table says its step in a way that may be read as another; empty where none does."""
     for key, text in table.attributes.items():
