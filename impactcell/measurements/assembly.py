@@ -19,6 +19,7 @@ from impactcell.measurements.mapping import Mapping
 from impactcell.measurements.measured_records import Record
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.recorders import of_one_recording, records_of
+from impactcell.measurements.repeated_rows import without_repeats
 from impactcell.measurements.scalars import said_beside
 from impactcell.measurements.table import Table
 from impactcell.measurements.taps import taps_of
@@ -58,10 +59,11 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     if mapping.faults:
         raise MeasurementError("\n".join(mapping.faults))
     given = mapping.given
+    tables, notes_of_rows = without_repeats(tables, given)
     tables = of_one_recording(tables, mapping)
     records, notes_of_recorders = records_of(tables, mapping)
     check_channels_alike(records, mapping)
-    notes = [*notes_of_recorders, *_said_of(tables, given)]
+    notes = [*notes_of_rows, *notes_of_recorders, *_said_of(tables, given)]
     excitation = given.excitation or excitation_of(records, notes)
     _check_channels(records, mapping, excitation)
     notes += _of_sums(mapping, excitation)

@@ -21,6 +21,7 @@ from impactcell.measurements.recognition import (
     ColumnMeaning,
     name_score,
 )
+from impactcell.measurements.repeated_rows import without_repeats
 from impactcell.measurements.table import MeasuredColumn, Table
 from impactcell.measurements.text_channels import text_channels
 from impactcell.measurements.units import Dimension, MeasuredUnit
@@ -80,6 +81,7 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
         A column or unit that was given is not there.
     """
     given = given or Given()
+    tables, _ = without_repeats(tables, given)
     columns: dict[str, MeasuredColumn] = {}
     for table in tables:
         for column in table.columns:

@@ -66,6 +66,9 @@ GERMAN: Final = {
         "vielleicht daneben",
     r"positions left out of before the part was put to where it is struck, in (\d+) taps?":
         r"weggelassene Positionen von vor dem Zurücklegen des Teils (Stöße: \1)",
+    r"rows left out that stand twice: (\d+), in (.+)": r"weggelassene Zeilen, die doppelt stehen: \1, in \2",
+    r"rows left out that stand twice: (\d+), the first in (.+)":
+        r"weggelassene Zeilen, die doppelt stehen: \1, zuerst in \2",
     r"no samples before contact: the records' own t = 0 is taken":
         "keine Messwerte vor dem Kontakt: es gilt das t = 0 der Aufzeichnungen",
     r"no stroke is stated: the actuator is taken to halt as it loses contact":
