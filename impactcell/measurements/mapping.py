@@ -1,5 +1,6 @@
 """What each column of a table means: guessed, with the reason and how sure, or given."""
 
+from collections.abc import Mapping as AbstractMapping
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
@@ -14,6 +15,7 @@ from impactcell.measurements.column_units import (
 )
 from impactcell.measurements.given_values import Given, check_given, unused_gains, without_use
 from impactcell.measurements.recognition import (
+    CHANNELS,
     SPEED_OF,
     UNIT_ALONE,
     UNIT_MATCH,
@@ -111,6 +113,9 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
         if taken is None and item.column not in chosen:
             chosen[item.column] = quantities[item.meaning] = item
     _prefer_position(chosen, quantities, candidates)
+    shot = quantities.get(ColumnMeaning.SHOT)
+    if shot is not None and shot.confidence < GIVEN and _counts_samples(shot.column, tables, quantities):
+        del chosen[shot.column]
     speed = SPEED_OF.get(_dimension_of(quantities.get(ColumnMeaning.POSITION)))
     assignments = tuple(
         chosen.get(name) or _further(column, given, speed) for name, column in columns.items()
@@ -140,6 +145,19 @@ def _prefer_position(
                 del quantities[ColumnMeaning.ACTUATOR]
                 chosen[item.column] = quantities[ColumnMeaning.POSITION] = item
             return
+
+
+def _counts_samples(
+    name: str, tables: Sequence[Table], quantities: AbstractMapping[ColumnMeaning, Assignment]
+) -> bool:
+    """Whether a column counts the rows wherever a channel stands beside it; in a list it may count shots."""
+    channels = {quantities[meaning].column for meaning in CHANNELS if meaning in quantities}
+    beside = [
+        column.values
+        for table in tables
+        if (column := table.column(name)) is not None and any(map(table.column, channels))
+    ]
+    return bool(beside) and all(len(values) > 2 and counts_rows(values) for values in beside)
 
 
 def _beside(tables: Sequence[Table]) -> dict[str, set[str]]:

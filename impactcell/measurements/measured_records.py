@@ -152,9 +152,8 @@ def _parts(table: Table, mapping: Mapping, faults: list[str]) -> list[tuple[Tabl
     if len(distinct) > max(0.2 * len(keys), 1) and len(keys) > 50 and _has_channel(table, mapping):
         faults.append(
             f"{table.title}: column {column.name!r} has {len(distinct)} values in {len(keys)} rows, so it "
-            f"does not "
-            f"number shots; say --column {column.name!r} is something else with --column shot=NAME or "
-            f"ignored=NAME"
+            f"does not number shots; name the column that does with --column shot=NAME, or leave this one "
+            f"out with --column 'ignored={column.name}'"
         )
         return []
     parts = []

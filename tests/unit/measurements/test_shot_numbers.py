@@ -10,6 +10,7 @@ from impactcell import campaign
 from impactcell.errors import MeasurementError
 from impactcell.measurements import Given, Imported, MeasuredColumn, Table, guess, make_campaign
 from impactcell.measurements.given import read_given
+from impactcell.web.texts.import_faults import page_fault
 from tests.unit.measurements.records import sampled, taps
 
 ROWS = 400
@@ -109,3 +110,50 @@ def test_taps_keep_the_numbers_of_their_column(*, is_turned: bool) -> None:
     tables = [Table("a.csv", (*of, MeasuredColumn("shot", None, cut)))]
     made = make_campaign(tables, guess(tables, given))
     assert [shot.cycle for shot in made.campaign.shots] == list(range(1, 9))
+
+
+def counted(name: str, numbers: np.ndarray) -> Table:
+    """Give a tap at 10 kHz with a column of numbers, and no times."""
+    _, force, position = sampled(taps((3000,), (18.9,))[0], np.random.default_rng(5))
+    columns = (
+        MeasuredColumn(name, None, np.resize(numbers, force.size)),
+        MeasuredColumn("Kraft", "N", force),
+        MeasuredColumn("Weg", "m", position),
+    )
+    said = {"Abtastrate": "10000 Hz", "Masse": "18.9 kg", "Vorschub": "3000 mm/min"}
+    return Table("a.csv", columns, attributes=said)
+
+
+@pytest.mark.parametrize("name", ["Nr.", "n", "Messung"])
+@pytest.mark.parametrize("first", [0, 1])
+def test_a_column_that_counts_the_samples_numbers_no_shots(name: str, first: int) -> None:
+    """It was refused, where the file says its rate."""
+    table = counted(name, np.arange(float(first), 10_000.0))
+    mapping = guess([table])
+    (item,) = (item for item in mapping.assignments if item.column == name)
+    assert (str(item.meaning), item.why) == ("ignored", "counts the rows")
+    (shot,) = make_campaign([table], mapping).campaign.shots
+    assert shot.force is not None
+    assert np.median(np.diff(shot.force.time_s)) == pytest.approx(1e-4)
+
+
+def test_a_list_of_shots_beside_their_records_numbers_them() -> None:
+    numbers = tuple(np.arange(1.0, 61.0))
+    listed = (
+        MeasuredColumn("shot", None, np.array(numbers)),
+        MeasuredColumn("mass", "kg", 2.0 + np.array(numbers)),
+    )
+    tables = [driven(numbers, "a.h5"), Table("a.h5", listed)]
+    found = make_campaign(tables, guess(tables)).campaign.shots
+    assert [(shot.cycle, shot.mass_kg) for shot in found] == [(int(n), 2.0 + n) for n in numbers]
+
+
+def test_the_way_out_of_what_numbers_no_shots_can_be_typed() -> None:
+    table = counted("Nr.", np.concatenate([np.arange(300.0), np.arange(200.0)]))
+    with pytest.raises(MeasurementError) as caught:
+        make_campaign([table], guess([table]))
+    told = str(caught.value)
+    assert told.endswith("with --column shot=NAME, or leave this one out with --column 'ignored=Nr.'")
+    given = read_given({"columns": ["ignored=Nr."]})
+    assert len(make_campaign([table], guess([table], given)).campaign.shots) == 1
+    assert page_fault(told, "de")[1].endswith("zählt also keine Stöße; unten im Formular eine andere wählen")
