@@ -96,9 +96,20 @@ def lacking(
         names = ", ".join(repr(item.column) for item in assignments)
         faults.append(
             f"neither position nor force was found among {names}; name them with --column position=NAME and "
-            f"--column force=NAME"
+            f"--column force=NAME{_or_encoding(tables)}"
         )
     return faults
+
+
+def _or_encoding(tables: Sequence[Table]) -> str:
+    """Say how names become readable whose file may be in another encoding than it was read in."""
+    for table in tables:
+        if table.encoding and not all(column.name.isascii() for column in table.columns):
+            return (
+                f", or, where the names are others, give the encoding of the file, which was read as "
+                f"{table.encoding}: --encoding gb18030, say"
+            )
+    return ""
 
 
 def _of_column(item: Assignment) -> list[str]:

@@ -15,6 +15,8 @@ DELIMITERS = {";": "semicolon", "\t": "tab", ",": "comma", "|": "bar", " ": "whi
 DECIMALS = (".", ",")
 SAMPLED_LINES = 200
 """Lines in the later part of a file from which its dialect is told: enough for any mixture of cells."""
+EIGHT_BIT = ("cp1252", "latin-1")
+"""Encodings taken for a file that is no UTF-8: the second has a sign for each byte."""
 _ONE_OR_TWO = re.compile(r"\s*[+-]?\d+,\d+\s*")
 """A row that is one number with a decimal comma, or two whole ones."""
 _BYTE_ORDER_MARKS = (
@@ -92,7 +94,7 @@ def _encoding(content: bytes, source: str) -> str:
     try:
         content.decode("utf-8")
     except UnicodeDecodeError:
-        return "cp1252" if _is_cp1252(content) else "latin-1"
+        return EIGHT_BIT[0 if _is_cp1252(content) else 1]
     return "utf-8"
 
 

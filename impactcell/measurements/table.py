@@ -57,6 +57,8 @@ class Table:
         Line of each row, counted from 1; None where the file has no lines.
     decimal : str
         Decimal mark of numbers that the file writes as text.
+    encoding : str
+        In which a text file was read that is no UTF-8 and does not say; empty for all others.
     recording : str
         What its channels were recorded together with, where that is more than its file.
     constant_as : str
@@ -70,6 +72,7 @@ class Table:
     notes: tuple[str, ...] = ()
     lines: Lines | None = None
     decimal: str = "."
+    encoding: str = ""
     recording: str = ""
     constant_as: str = "'velocity: 3000 mm/min' in a line above the table"
 

@@ -10,7 +10,15 @@ import numpy as np
 from impactcell.errors import MeasurementError
 from impactcell.measurements.cells import CHUNK_ROWS, LineFaults, numbers_of
 from impactcell.measurements.column_groups import by_their_times
-from impactcell.measurements.dialect import DELIMITERS, Dialect, decode, detect, later_lines, split_cells
+from impactcell.measurements.dialect import (
+    DELIMITERS,
+    EIGHT_BIT,
+    Dialect,
+    decode,
+    detect,
+    later_lines,
+    split_cells,
+)
 from impactcell.measurements.labview import is_labview, read_labview
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.moments import read_moments
@@ -52,6 +60,7 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
         notes=tuple(notes),
         lines=numbers,
         decimal=decimal,
+        encoding=encoding if given.encoding is None and encoding in EIGHT_BIT else "",
     )
     return by_their_times(table)
 

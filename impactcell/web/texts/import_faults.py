@@ -63,6 +63,13 @@ FAULTS: Final = (
     ),
     FaultPattern(r"has no rows", "has no rows", "hat keine Zeilen"),
     FaultPattern(
+        r"neither position nor force was found among (?P<names>.+); name them .+, or, where the names are .*",
+        "neither position nor force was found among {names}; where the names are others, save the file as "
+        "UTF-8, else choose their columns in the form below",
+        "weder Position noch Kraft gefunden unter {names}: heißen die Spalten anders, die Datei als UTF-8 "
+        "speichern, sonst sie unten im Formular wählen",
+    ),
+    FaultPattern(
         r"neither position nor force was found among (?P<names>.+); name them with --column .*",
         "neither position nor force was found among {names}; choose their columns in the form below",
         "weder Position noch Kraft gefunden unter {names}: ihre Spalten unten im Formular wählen",

@@ -5,9 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from impactcell.measurements import ColumnMeaning, guess, make_campaign, read_tables
+from impactcell.measurements import ColumnMeaning, Dialect, guess, make_campaign, read_tables
 from impactcell.measurements.given import read_given
 from impactcell.measurements.units import parse_unit, split_unit
+from impactcell.web.texts.import_faults import page_fault
 from tests.unit.measurements.records import sampled, taps
 
 NAMES = (
@@ -127,3 +128,27 @@ def test_a_column_in_the_notation_of_din_says_the_velocity(tmp_path: Path) -> No
     assert velocity.column == "v"
     (shot,) = make_campaign(tables, mapping).campaign.shots
     assert shot.velocity_m_s == pytest.approx(0.05)
+
+
+def test_names_in_an_encoding_that_was_not_told_say_so(tmp_path: Path) -> None:
+    """They were asked to be named as they were misread."""
+    rows = ["时间(毫秒),力(牛),位移(毫米)", *(f"{0.1 * i:.1f},{i % 7}.5,{i % 5}.25" for i in range(50))]
+    path = tmp_path / "a.csv"
+
+    def faults(written: str, given: str | None) -> list[str]:
+        path.write_text("\n".join(rows), encoding=written)
+        return [
+            fault
+            for fault in guess(read_tables(path, dialect=Dialect(encoding=given))).faults
+            if fault.startswith("neither position nor force was found")
+        ]
+
+    (told,) = faults("gb18030", None)
+    assert told.endswith("give the encoding of the file, which was read as cp1252: --encoding gb18030, say")
+    assert page_fault(told, "de")[1].endswith(
+        "heißen die Spalten anders, die Datei als UTF-8 speichern, sonst sie unten im Formular wählen"
+    )
+    for written, given in (("gb18030", "gb18030"), ("utf-8", None)):
+        (told,) = faults(written, given)
+        assert "力(牛)" in told
+        assert "--encoding" not in told
