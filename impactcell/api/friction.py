@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from impactcell.campaign.pretrigger import is_late, late_onset
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError, PredictionError
 from impactcell.features import Features, extract, noise_std
 from impactcell.physics import TapInput
@@ -75,7 +76,8 @@ def estimate(
     Raises
     ------
     CaptureError
-        Arrays of different lengths, or of more than one dimension; a velocity or mass that cannot be.
+        Arrays of different lengths, or of more than one dimension; a velocity or mass that cannot be; a force
+        that pulls, a position that falls, a contact that does not begin at t = 0.
     SettingsError
         The model file cannot be read.
     PredictionError
@@ -97,6 +99,7 @@ def estimate(
         )
     _check_velocity(velocity_m_s, is_needed=model is None)
     _check_mass(mass_kg, is_needed=model is None)
+    _check_signs_and_start(time, force, position)
     capture = Capture(
         cycle=1,
         velocity_m_s=velocity_m_s,
@@ -135,6 +138,30 @@ def _check_velocity(velocity_m_s: float, *, is_needed: bool) -> None:
 def _check_mass(mass_kg: float, *, is_needed: bool) -> None:
     if mass_kg < 0.0 or math.isinf(mass_kg) or (is_needed and not mass_kg > 0.0):
         raise CaptureError(f"mass_kg = {mass_kg:g}: give the mass of the part in kg, above 0")
+
+
+def _check_signs_and_start(time_s: Samples, force_n: Samples, position_m: Samples) -> None:
+    """Refuse traces of the other sign, and of another t = 0, with what would mend them."""
+    if not (len(time_s) and np.isfinite(force_n).all() and np.isfinite(position_m).all()):
+        return  # what is wrong with the samples is told by the features
+    if -float(force_n.min()) > float(force_n.max()):
+        raise CaptureError(
+            f"force_n pulls with {-force_n.min():.4g} N, where a contact only pushes: give -force_n"
+        )
+    end = max(len(time_s) // 50, 1)
+    way_m = float(np.median(position_m[-end:]) - np.median(position_m[:end]))
+    lowest, highest = float(position_m.min() - position_m[0]), float(position_m.max() - position_m[0])
+    if way_m < 0.0 and -lowest > 10.0 * abs(highest):
+        raise CaptureError(
+            f"position_m falls by {-1e3 * way_m:.4g} mm, and is positive along the tap: give -position_m"
+        )
+    onset = late_onset(Channel(time_s, force_n))
+    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
+    if onset is not None and is_late(float(time_s[onset]), step_s, is_stated=bool(time_s[0] < 0.0)):
+        raise CaptureError(
+            f"the force begins at {1e3 * time_s[onset]:.4g} ms, and t = 0 is first contact: give "
+            f"time_s - {time_s[onset] - step_s:.6g}, or look for a step of the force before"
+        )
 
 
 def _of_one_tap(fault: PredictionError | PhysicsError) -> PredictionError:

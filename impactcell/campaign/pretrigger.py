@@ -55,8 +55,8 @@ def from_contact(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     return replace(campaign, shots=counted), tuple(notes)
 
 
-def _late_onset(force: Channel | None) -> int | None:
-    """Sample at which contact begins; None where it is the first, or where none, or no rest before, shows."""
+def late_onset(force: Channel | None) -> int | None:
+    """Give the sample at which contact begins; None where that is the first, or no rest before it shows."""
     if force is None or len(force.values) < FEWEST_SAMPLES or np.ptp(force.values) == 0.0:
         return None
     baseline = contacts.baseline_of(force.values)
@@ -69,8 +69,13 @@ def _late_onset(force: Channel | None) -> int | None:
     return found[0] if rise < RISE_SHARE * baseline.threshold else None
 
 
+def is_late(lateness_s: float, step_s: float, *, is_stated: bool) -> bool:
+    """Whether contact is so far from t = 0 that this is not meant by it; `is_stated`: samples lie before it."""
+    return abs(lateness_s) >= max(MIN_LATE_STEPS * step_s, STATED_LATE_S if is_stated else MIN_LATE_S)
+
+
 def _from_onset(shots: Sequence[Capture], notes: list[str]) -> tuple[Capture, ...]:
-    onsets = [_late_onset(shot.force) for shot in shots]
+    onsets = [late_onset(shot.force) for shot in shots]
     late = [
         (shot, shot.force, onset)
         for shot, onset in zip(shots, onsets, strict=True)
@@ -81,7 +86,7 @@ def _from_onset(shots: Sequence[Capture], notes: list[str]) -> tuple[Capture, ..
     step = float(np.median([np.median(np.diff(force.time_s)) for _, force, _ in late]))
     lateness = float(np.median([force.time_s[onset] for _, force, onset in late]))
     is_stated = any(force.time_s[0] < 0.0 for _, force, _ in late)
-    if abs(lateness) < max(MIN_LATE_STEPS * step, STATED_LATE_S if is_stated else MIN_LATE_S):
+    if not is_late(lateness, step, is_stated=is_stated):
         return tuple(shots)
     starts = contacts.onset_within_sample(
         [force.time_s for _, force, _ in late],

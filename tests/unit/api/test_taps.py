@@ -147,6 +147,38 @@ def test_a_force_in_other_units_is_to_be_looked_at() -> None:
         impactcell.estimate(tap.time_s, 1e-3 * tap.force_n, tap.position_m, 0.04, 18.9)
 
 
+@pytest.mark.parametrize(
+    ("turned", "message"),
+    [
+        ("force", r"^force_n pulls with \d+\.?\d* N, where a contact only pushes: give -force_n$"),
+        ("position", r"^position_m falls by 2\.\d+ mm, and is positive along the tap: give -position_m$"),
+        ("time", r"^the force begins at 30\.\d* ms, and t = 0 is first contact: give time_s - 0\.03\b"),
+    ],
+)
+@pytest.mark.parametrize("with_model", [False, True])
+def test_signs_and_a_start_that_are_not_those_of_a_tap_are_refused(
+    turned: str, message: str, with_model: bool, pytestconfig: pytest.Config
+) -> None:
+    """They were told as a slide that is too short, as no contact, as an actuator that pushes without end."""
+    draw = np.random.default_rng(4)
+    tap = impactcell.simulate_tap(0.04, 18.9, plant=PLANT, time_s=np.arange(-300, 1500) * 1e-4)
+    time_s, force, position = tap.time_s, tap.force_n.copy(), tap.position_m.copy()
+    force[time_s <= 0.0], position[time_s <= 0.0] = 0.0, 0.0
+    force = force + draw.normal(0.0, 0.4, len(force))
+    position = position + draw.normal(0.0, 1.5e-6, len(position))
+    model = pytestconfig.rootpath / "config" / "models" / "prototype.yaml" if with_model else None
+    impactcell.estimate(time_s, force, position, 0.04, 18.9, model=model)
+    match turned:
+        case "force":
+            force = -force
+        case "position":
+            position = 0.3 - position
+        case "time":
+            time_s = time_s + 0.03
+    with pytest.raises(CaptureError, match=message):
+        impactcell.estimate(time_s, force, position, 0.04, 18.9, model=model)
+
+
 def test_a_mass_that_no_plant_explains_is_told_without_the_words_of_a_campaign() -> None:
     tap = impactcell.simulate_tap(0.04, 18.9, plant=PLANT)
     with pytest.raises(NotConvergedError, match=r"^no k, b and mu_k/mu_s explain the tap; .* mass"):
