@@ -97,7 +97,7 @@ def _taps(config: CellConfig, recorded: Path | None, taps: int) -> tuple[str, Ca
     if config.settings.journal is None:
         raise SettingsError(f"{config.path}: the cell keeps no journal; name a campaign with --campaign")
     path = config.settings.journal.file
-    with open_journal(path) as journal:
+    with open_journal(path, config.name) as journal:
         captures = list(islice(journal.captures(damaged=note_damage), taps))
     if not captures:
         raise CampaignError(

@@ -65,13 +65,13 @@ def compare_on_own_taps(config: CellConfig, after: Model) -> OwnTaps | None:
     Raises
     ------
     JournalError
-        The journal cannot be read.
+        The journal cannot be read, or is another cell's.
     """
     section = config.settings.journal
     if section is None or not section.file.is_file():
         return None
     defaults = cell_design(config).defaults
-    with open_journal(section.file) as journal:
+    with open_journal(section.file, config.name) as journal:
         captures = [
             fill_defaults(defaults, one) for one in journal.captures(damaged=note_damage, newest=TAPS)
         ]

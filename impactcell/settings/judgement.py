@@ -236,7 +236,7 @@ def _measured_noise(cell: CellConfig, sensor: str) -> float:
     if journal is None or not journal.file.is_file():
         return math.nan
     try:
-        with Journal(journal.file, None, read_only=True) as stored:
+        with Journal(journal.file, cell.name, read_only=True) as stored:
             captures = list(islice(stored.captures(damaged=lambda _: None), NOISE_TAPS))
     except JournalError:  # `run` and `model fit` say what is wrong with it
         return math.nan

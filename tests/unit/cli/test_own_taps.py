@@ -15,7 +15,7 @@ import pytest
 from impactcell.cli.accept_model import previous_model
 from impactcell.cli.app import run_verb
 from impactcell.cli.own_taps import TAPS, OwnTaps, compare_on_own_taps
-from impactcell.errors import PredictionError, SettingsError
+from impactcell.errors import ForeignJournalError, PredictionError, SettingsError
 from impactcell.journal.store import Journal
 from impactcell.physics.effects import LIBRARY, withdraw_effect
 from impactcell.physics.outside_effects import offer_effects
@@ -160,6 +160,18 @@ def test_whose_model_changes_too_is_told(cell: Path, capsys: pytest.CaptureFixtu
     with pytest.raises(SystemExit):
         run_verb(["model", "accept", str(cell), str(other)])
     assert "model file of" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verb", [["fit"], ["accept", "other.yaml"], ["accept", "other.yaml", "--dry-run"]])
+def test_taps_of_another_cell_give_and_judge_no_model(cell: Path, verb: list[str]) -> None:
+    """A cell file that was copied for a second cell, with the first one's journal still in it."""
+    write_model(oily(read_cell(cell).model), cell.parent / "other.yaml")
+    cell.write_text(cell.read_text().replace("cell: own", "cell: second"))
+    before = files(cell.parent)
+    command, *others = verb
+    with pytest.raises(ForeignJournalError, match="the journal of cell 'own', not of 'second'; name another"):
+        run_verb(["model", command, str(cell), *(str(cell.parent / one) for one in others[:1]), *others[1:]])
+    assert files(cell.parent) == before
 
 
 def test_an_effect_file_that_a_model_needs_is_told(cell: Path, capsys: pytest.CaptureFixture[str]) -> None:
