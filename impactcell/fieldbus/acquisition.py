@@ -32,6 +32,7 @@ from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.fieldbus.status_reader import StatusReader
 from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.process.cell_logger import CellLogger
+from impactcell.process.condition_log import kind_of
 from impactcell.records import CycleId, ModuleStatus
 
 __all__ = ["ModuleAcquisition", "ModuleStatus", "ReceivedCycle"]
@@ -251,7 +252,7 @@ class ModuleAcquisition:
         return status
 
     async def _disconnect(self, error: FieldbusError) -> None:
-        """Close the connection after an error and say why, once for each new reason."""
+        """Close the connection after an error and say why, once for each new kind of reason."""
         self._ready.clear()
         await self._client.close()
         reason = str(error) if str(error).startswith(self.cell) else f"{self.cell}: {error}"
@@ -259,9 +260,9 @@ class ModuleAcquisition:
 
     def _report_link(self, *, connected: bool, reason: str, level: int = logging.WARNING) -> None:
         before = self._status
-        self._status = replace(before, connected=connected, reason=reason)
-        if (before.connected, before.reason) == (connected, reason):
+        if (before.connected, kind_of(before.reason)) == (connected, kind_of(reason)):
             return
+        self._status = replace(before, connected=connected, reason=reason)
         if connected:
             self._log.info("connected to %s", self.link)
         else:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from impactcell.fieldbus.plausibility import wrong_word_order
 from impactcell.fieldbus.register_image import RegisterImage, decoded_image, group_registers
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.records import ModuleStatus
 from simulator.scripted import ScriptedDevice
 from tests.unit.fieldbus.test_acquisition import HEADER, make, running
 from tests.unit.fieldbus.test_stale_status import layout
@@ -44,6 +45,42 @@ async def test_a_wrong_word_order_is_refused_by_name_and_nothing_is_taken(
         coming.cancel()
         await asyncio.gather(coming, return_exceptions=True)
     assert device.acknowledged == []
+
+
+async def test_a_counter_that_goes_on_is_no_new_reason(
+    layout: RegisterMap, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A module that went on striking filled the log with its counter, line by line."""
+    proofs: list[str] = []
+
+    def proved(*shown: Any) -> str | None:
+        told = wrong_word_order(*shown)
+        proofs.extend([told] if told else [])
+        return told
+
+    for module_name in ("status_reader", "identity"):
+        monkeypatch.setattr(f"impactcell.fieldbus.{module_name}.wrong_word_order", proved)
+    device = ScriptedDevice(layout, session=7)
+    make(device, 20)
+    statuses = [ModuleStatus()]
+    async with running(layout.with_word_order("little"), device, statuses=statuses) as (
+        _,
+        module,
+        receptions,
+    ):
+        coming = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
+        while "the word order is wrong" not in module.status.reason:
+            await asyncio.sleep(0)
+        for _ in range(2):
+            make(device)
+            proofs.clear()
+            while len(proofs) < 6:  # two on each connection at most
+                await asyncio.sleep(0)
+        coming.cancel()
+        await asyncio.gather(coming, return_exceptions=True)
+        told = [line for line in caplog.messages if "the word order is wrong" in line]
+        assert len(told) == 1, told
+        assert len([one for one in statuses if "the word order is wrong" in one.reason]) == 1
 
 
 async def test_a_module_that_has_made_no_cycle_yet_is_judged_by_its_first(layout: RegisterMap) -> None:
