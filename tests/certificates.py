@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
-from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.asymmetric import ec, rsa
 from cryptography.x509.oid import NameOID
 
 
@@ -62,3 +62,32 @@ class Authority:
             )
         )
         return certificate, private
+
+
+def self_signed(
+    directory: Path, uri: str, begin: dt.datetime, end: dt.datetime, form: serialization.Encoding
+) -> tuple[Path, Path]:
+    """Write `cert.der` or `cert.pem`, valid between two times, and `key.pem` of an application."""
+    key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
+    name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "own")])
+    certificate = (
+        x509.CertificateBuilder()
+        .subject_name(name)
+        .issuer_name(name)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(begin)
+        .not_valid_after(end)
+        .add_extension(x509.SubjectAlternativeName([x509.UniformResourceIdentifier(uri)]), critical=False)
+        .sign(key, hashes.SHA256())
+    )
+    directory.mkdir(parents=True, exist_ok=True)
+    kind = "pem" if form == serialization.Encoding.PEM else "der"
+    files = directory / f"cert.{kind}", directory / "key.pem"
+    files[0].write_bytes(certificate.public_bytes(form))
+    files[1].write_bytes(
+        key.private_bytes(
+            serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
+        )
+    )
+    return files

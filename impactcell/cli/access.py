@@ -3,22 +3,18 @@
 import getpass
 import shlex
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 
 from cryptography import x509
 
 from impactcell.cli.paths import check_directory, check_output, kind_of
 from impactcell.errors import AccessError
+from impactcell.opcua.certificate_dates import validity_mark
+from impactcell.opcua.certificate_files import der, fingerprint, read_certificate, thumbprint
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
 from impactcell.opcua.host_interface import Role
-from impactcell.opcua.trust_list import (
-    FOLDERS,
-    der,
-    fingerprint,
-    make_folders,
-    read_certificate,
-    thumbprint,
-)
+from impactcell.opcua.trust_list import FOLDERS, make_folders
 from impactcell.process.console import print_result
 from impactcell.process.path_kind import Kind
 from impactcell.scada.interface import default_application_uri
@@ -181,6 +177,7 @@ def list_certs(pki: Path) -> None:
         raise AccessError(f"{pki}: is a file; name the directory that holds own, trusted and rejected")
     if kind is Kind.NOTHING:
         raise AccessError(f"{pki}: is not there; make it with `impactcell certs make {pki}`")
+    now = datetime.now(UTC)
     for folder in FOLDERS:
         for path in sorted((pki / folder).glob("*")):
             try:
@@ -189,7 +186,8 @@ def list_certs(pki: Path) -> None:
                 continue
             until = f"{certificate.not_valid_after_utc:%Y-%m-%d}"
             subject = certificate.subject.rfc4514_string()
-            _say(f"{folder:9} {until} {thumbprint(der(certificate))} {subject}")
+            mark = validity_mark(certificate, now)
+            _say(f"{folder:9} {until} {thumbprint(der(certificate))} {subject}{mark and f' ({mark})'}")
             if folder == "rejected":
                 _say(f"          trust it with: impactcell certs trust '{path}'")
 

@@ -22,7 +22,10 @@ answers of `host_interface`, and starts it. Below it, from the wire inwards:
 `tcp_connection`             frames in and out; refuses half-open connections, clients that do not read
 `connection_table`           which connections there are, and what they may hold together
 `secure_channel`             trust checked before a channel opens; renewal; limits
-`trust_list`                 the server's certificate and those it trusts
+`trust_list`                 the folders of certificates, and who may connect
+`own_certificate`            the server's certificate and key, read as it uses them
+`certificate_files`          certificates as they lie in files
+`certificate_dates`          which of them have ended, or soon will
 `certificates`               making certificates
 `binary_codec`               requests and responses as bytes; one exception for what cannot be read
 `request_dispatch`           from a request to its service; every fault becomes the standard's status code

@@ -17,9 +17,10 @@ from cryptography.hazmat.primitives.asymmetric import padding, rsa
 
 from impactcell.opcua.asyncua_adapter import INVALID_SIGNATURE, SIGNATURE_CHECKS
 from impactcell.opcua.binary_codec import StatusCodeError
+from impactcell.opcua.certificate_files import fingerprint, first_of_chain, parse_certificate
 from impactcell.opcua.host_interface import Actor, UserDirectory
 from impactcell.opcua.login_throttle import LoginThrottle
-from impactcell.opcua.trust_list import TrustList, fingerprint, first_of_chain, parse_certificate
+from impactcell.opcua.trust_list import TrustList
 
 _log = logging.getLogger(__name__)
 

@@ -201,6 +201,7 @@ class ServiceHost:
 
     def _tick(self) -> None:
         now, ids = datetime.now(UTC), ua.ObjectIds
+        self._trust.look_at_own(now)
         self._values.set_value(
             ua.NodeId(ids.Server_ServerStatus_CurrentTime), now, ua.VariantType.DateTime, now
         )
@@ -260,11 +261,7 @@ class ServiceHost:
             (ids.Server_ServerStatus_BuildInfo_SoftwareVersion, self._host.product.version, kinds.String),
             (ids.Server_ServerStatus_BuildInfo_BuildNumber, self._host.product.version, kinds.String),
             (ids.Server_ServerStatus_BuildInfo_BuildDate, now, kinds.DateTime),
-            (
-                ids.Server_ServerCapabilities_MaxBrowseContinuationPoints,
-                MAX_BROWSE_POINTS,
-                kinds.UInt16,
-            ),
+            (ids.Server_ServerCapabilities_MaxBrowseContinuationPoints, MAX_BROWSE_POINTS, kinds.UInt16),
             (
                 ids.Server_ServerCapabilities_MaxHistoryContinuationPoints,
                 MAX_HISTORY_POINTS,

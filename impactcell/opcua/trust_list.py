@@ -15,7 +15,6 @@ DER and PEM are both read, whatever the file is called.
 """
 
 import datetime as dt
-import hashlib
 import logging
 from collections.abc import Iterator
 from functools import lru_cache
@@ -23,12 +22,27 @@ from pathlib import Path
 from typing import Final
 
 from cryptography import x509
-from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
-from cryptography.hazmat.primitives import hashes, serialization
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import rsa
 
 from impactcell.errors import AccessError
+from impactcell.opcua.certificate_dates import CertificateWatch
+from impactcell.opcua.certificate_files import (
+    UNREADABLE,
+    der,
+    first_of_chain,
+    parse_certificate,
+    thumbprint,
+)
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
+from impactcell.opcua.own_certificate import (
+    CERTIFICATE,
+    KEY,
+    made_anew,
+    read_own_certificate,
+    read_own_key,
+)
 
 _log = logging.getLogger(__name__)
 
@@ -43,66 +57,8 @@ MAX_CHAIN_LENGTH: Final = 5
 """Certificates from a client's to a trusted authority."""
 
 
-UNREADABLE: Final = (
-    ValueError,
-    TypeError,
-    UnsupportedAlgorithm,
-    x509.InvalidVersion,
-    x509.DuplicateExtension,
-    x509.UnsupportedGeneralNameType,
-)
-"""What reading a certificate that somebody else has made may raise."""
-
-
 class UntrustedError(Exception):
     """A certificate that may not connect."""
-
-
-def thumbprint(certificate: bytes) -> str:
-    """SHA-1 thumbprint of a DER certificate in capital hexadecimal, as OPC UA tools show it."""
-    return hashlib.sha1(certificate, usedforsecurity=False).hexdigest().upper()
-
-
-def fingerprint(certificate: bytes) -> str:
-    """SHA-256 of a DER certificate in capital hexadecimal, by which the users file knows a certificate."""
-    return hashlib.sha256(certificate).hexdigest().upper()
-
-
-def read_certificate(path: Path) -> x509.Certificate:
-    """Read a certificate in PEM or DER.
-
-    Raises
-    ------
-    AccessError
-        The file is absent or holds no certificate.
-    """
-    try:
-        return parse_certificate(path.read_bytes())
-    except OSError as error:
-        raise AccessError(f"{path}: {error.strerror}") from error
-    except ValueError as error:
-        raise AccessError(f"{path}: no certificate in PEM or DER") from error
-
-
-@lru_cache(maxsize=1024)
-def parse_certificate(data: bytes) -> x509.Certificate:
-    """Read a certificate in PEM or DER.
-
-    Raises
-    ------
-    ValueError
-        It cannot be read, or has a key that cannot be used.
-    """
-    is_pem = data.lstrip().startswith(b"-----BEGIN")
-    try:
-        certificate = (x509.load_pem_x509_certificate if is_pem else x509.load_der_x509_certificate)(data)
-        # What is looked at later is read now: each has errors of its own.
-        certificate.public_key()
-        _ = certificate.signature_hash_algorithm, certificate.subject, certificate.issuer
-        _ = certificate.extensions, certificate.not_valid_before_utc, certificate.not_valid_after_utc
-    except UNREADABLE as error:
-        raise ValueError(f"not a certificate: {error}") from error
-    return certificate
 
 
 @lru_cache(maxsize=64)
@@ -112,11 +68,6 @@ def _parse_revocations(data: bytes) -> x509.CertificateRevocationList:
         return (x509.load_pem_x509_crl if is_pem else x509.load_der_x509_crl)(data)
     except UNREADABLE as error:
         raise ValueError(f"not a revocation list: {error}") from error
-
-
-def der(certificate: x509.Certificate) -> bytes:
-    """Binary form of a certificate."""
-    return certificate.public_bytes(serialization.Encoding.DER)
 
 
 def make_folders(directory: Path) -> None:
@@ -140,36 +91,20 @@ class TrustList:
     def __init__(self, directory: Path, application_uri: str) -> None:
         self._directory = directory
         make_folders(directory)
-        certificate_path = directory / "own" / "cert.der"
-        key_path = directory / "own" / "key.pem"
-        if not certificate_path.exists() and not key_path.exists():
-            write_pair(directory / "own", *make_certificate("impactcell", application_uri, own_hosts()))
+        own = directory / "own"
+        if not (own / CERTIFICATE).exists() and not (own / KEY).exists():
+            write_pair(own, *make_certificate("impactcell", application_uri, own_hosts()))
             _log.warning(
-                "%s: made a certificate for %s; clients have to trust it", certificate_path, application_uri
+                "%s: made a certificate for %s; clients have to trust it", own / CERTIFICATE, application_uri
             )
-        self.certificate = read_certificate(certificate_path)
+        self.certificate = read_own_certificate(directory, application_uri)
         self.own_certificate = der(self.certificate)
-        if application_uri not in application_uris(self.own_certificate):
-            raise AccessError(
-                f"{certificate_path}: made for another application URI than {application_uri}; make a new one"
-            )
-        try:
-            private_key = serialization.load_pem_private_key(key_path.read_bytes(), None)
-        except OSError as error:
-            raise AccessError(
-                f"{key_path}: {error.strerror}; put it back, or move cert.der away too: both are made anew"
-            ) from error
-        except (ValueError, TypeError, UnsupportedAlgorithm) as error:
-            raise AccessError(f"{key_path}: no private key in PEM without a passphrase") from error
-        if not isinstance(private_key, rsa.RSAPrivateKey) or (
-            private_key.public_key().public_numbers() != self._public_numbers()
-        ):
-            raise AccessError(f"{key_path}: not the RSA key of {certificate_path}")
-        self.private_key = private_key
+        self.private_key = read_own_key(directory, self.certificate)
+        self._watch = CertificateWatch(self.certificate, own / CERTIFICATE, made_anew(directory))
 
-    def _public_numbers(self) -> rsa.RSAPublicNumbers | None:
-        key = self.certificate.public_key()
-        return key.public_numbers() if isinstance(key, rsa.RSAPublicKey) else None
+    def look_at_own(self, now: dt.datetime) -> None:
+        """Tell in the log, once a day, where the server's own certificate does not hold, or soon will not."""
+        self._watch.look(now)
 
     @staticmethod
     def is_valid_now(certificate: x509.Certificate) -> bool:
@@ -265,32 +200,6 @@ class TrustList:
             path.write_bytes(der(certificate))
         except OSError as error:
             _log.warning("%s: cannot keep a rejected certificate: %s", folder, error.strerror)
-
-
-def first_of_chain(data: bytes) -> bytes:
-    """First certificate of a chain that is sent as certificates one after the other (Part 6, 6.2.6).
-
-    Raises
-    ------
-    ValueError
-        The bytes do not begin with a DER sequence.
-    """
-    if len(data) < 4 or data[0] != 0x30:
-        raise ValueError("not DER")
-    if data[1] < 0x80:
-        return data[: 2 + data[1]]
-    count = data[1] & 0x7F
-    return data[: 2 + count + int.from_bytes(data[2 : 2 + count], "big")]
-
-
-def application_uris(data: bytes) -> list[str]:
-    """Application URIs that a certificate was made out to."""
-    certificate = parse_certificate(first_of_chain(data))
-    try:
-        names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
-    except x509.ExtensionNotFound:
-        return []
-    return list(names.get_values_for_type(x509.UniformResourceIdentifier))
 
 
 def _may_issue(certificate: x509.Certificate) -> bool:

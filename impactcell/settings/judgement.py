@@ -1,7 +1,6 @@
 """A cell judged as a whole: files that are right each for itself, and do not fit each other."""
 
 import math
-import os
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,21 +9,21 @@ from pathlib import Path
 from statistics import median
 from typing import Final
 
-from impactcell.errors import AccessError, JournalError
+from impactcell.errors import JournalError
 from impactcell.features import noise_std
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.map_registers import unknown_names
 from impactcell.fieldbus.positioning_registers import not_placing
-from impactcell.journal.refusal import refusal
 from impactcell.journal.store import Journal
 from impactcell.prediction.mass_interpolation import velocity_range_m_s
 from impactcell.process import yaml_loader
 from impactcell.process.yaml_loader import FilePosition
 from impactcell.records import MM_PER_MIN
-from impactcell.scada.users import read_users
 from impactcell.settings.cells import CellConfig
 from impactcell.settings.commanded_taps import doubted_commands
 from impactcell.settings.plausible_tap import doubted_values, immovable
+from impactcell.settings.remark import Remark
+from impactcell.settings.service_files import of_service
 
 STROKE_TOLERANCE: Final = 0.01
 """A cell's stroke may differ from its model's by this share: less than a stroke is known to."""
@@ -67,13 +66,6 @@ class CellFinding:
         return f"{self.path}:{self.position}: {'' if self.is_fault else 'note: '}{self.message}"
 
 
-@dataclass(frozen=True, slots=True)
-class _Remark:
-    place: tuple[str, ...]
-    message: str
-    is_fault: bool = True
-
-
 def judge_cell(cell: CellConfig) -> list[CellFinding]:
     """Say what of a cell does not fit together, faults first.
 
@@ -83,7 +75,7 @@ def judge_cell(cell: CellConfig) -> list[CellFinding]:
         Its file is not what it was.
     """
     _, positions = yaml_loader.load(cell.path)
-    remarks = [*_of_model(cell), *_of_units(cell), *_of_sensors(cell), *_of_map(cell), *_of_service(cell)]
+    remarks = [*_of_model(cell), *_of_units(cell), *_of_sensors(cell), *_of_map(cell), *of_service(cell)]
     findings = [
         CellFinding(
             cell.path,
@@ -97,18 +89,18 @@ def judge_cell(cell: CellConfig) -> list[CellFinding]:
     return sorted(findings, key=lambda finding: not finding.is_fault)
 
 
-def _of_units(cell: CellConfig) -> Iterator[_Remark]:
+def _of_units(cell: CellConfig) -> Iterator[Remark]:
     if still := immovable(cell):
-        yield _Remark(("part", "mass_kg"), still)
+        yield Remark(("part", "mass_kg"), still)
     for place, doubt in doubted_values(cell):
-        yield _Remark(place, doubt, is_fault=False)
+        yield Remark(place, doubt, is_fault=False)
 
 
-def _of_model(cell: CellConfig) -> Iterator[_Remark]:
+def _of_model(cell: CellConfig) -> Iterator[Remark]:
     settings, model = cell.settings, cell.model
     calibrate = _calibrate(cell)
     if not model.predictors:
-        yield _Remark(
+        yield Remark(
             ("model",),
             f"model '{model.name}' has no predictors: friction cannot be told from peak force or distance; "
             f"{calibrate}",
@@ -119,13 +111,13 @@ def _of_model(cell: CellConfig) -> Iterator[_Remark]:
     if stroke_mm is not None and model.predictors:
         other_mm = model.stroke_m * 1e3
         if not abs(stroke_mm - other_mm) <= STROKE_TOLERANCE * stroke_mm:
-            yield _Remark(
+            yield Remark(
                 ("actuator", "stroke_mm"),
                 f"the stroke is {stroke_mm:g} mm, model '{model.name}' was calibrated for {other_mm:g} mm; "
                 f"{calibrate}",
             )
     if settings.alarms.wear_limit <= model.plant.mu_s:
-        yield _Remark(
+        yield Remark(
             ("alarms", "wear_limit"),
             f"the wear limit {settings.alarms.wear_limit:g} is not above the friction of the model itself "
             f"(mu_s {model.plant.mu_s:.4g}): the alarm would stand from the first cycle on",
@@ -146,19 +138,19 @@ def _calibrate(cell: CellConfig) -> str:
     return f"run `{command}`, which keeps its plant, and name that file as `model` (others may use this one)"
 
 
-def _of_predictors(cell: CellConfig, calibrate: str) -> Iterator[_Remark]:
+def _of_predictors(cell: CellConfig, calibrate: str) -> Iterator[Remark]:
     settings, predictors = cell.settings, cell.model.predictors
     lightest, heaviest = predictors[0].mass_kg, predictors[-1].mass_kg
     mass_kg = settings.part.mass_kg
     if mass_kg is not None and not lightest <= mass_kg <= heaviest:
-        yield _Remark(
+        yield Remark(
             ("part", "mass_kg"),
             f"the part has {mass_kg:g} kg, model '{cell.model.name}' is calibrated for {lightest:.4g} to "
             f"{heaviest:.4g} kg; {calibrate}",
         )
     highest = max(predictor.mu_s_range[1] for predictor in predictors)
     if settings.alarms.wear_limit > highest:
-        yield _Remark(
+        yield Remark(
             ("alarms", "wear_limit"),
             f"the model is calibrated up to mu_s {highest:.4g} only: values near the wear limit will be "
             f"uncertain; {calibrate}",
@@ -167,14 +159,14 @@ def _of_predictors(cell: CellConfig, calibrate: str) -> Iterator[_Remark]:
     limit = settings.actuator.max_velocity_mm_per_min
     slowest, fastest = velocity_range_m_s(cell.model, mass_kg or lightest)
     if limit < slowest / MM_PER_MIN * (1.0 - 1e-9):
-        yield _Remark(
+        yield Remark(
             ("actuator", "max_velocity_mm_per_min"),
             f"taps are at most {limit:g} mm/min, the model is calibrated for {slowest / MM_PER_MIN:g} to "
             f"{fastest / MM_PER_MIN:g} mm/min; {calibrate}",
         )
 
 
-def _of_sensors(cell: CellConfig) -> Iterator[_Remark]:
+def _of_sensors(cell: CellConfig) -> Iterator[Remark]:
     """Say where the noise of a sensor was never said, cannot be, or is larger in recorded taps."""
     sensors, plant = cell.settings.sensors, cell.model.plant
     velocity, mass_kg = (
@@ -195,21 +187,21 @@ def _of_sensors(cell: CellConfig) -> Iterator[_Remark]:
         if key not in sensors.model_fields_set:
             message = f"how noisy the {sensor} sensor is was not said: {said:g} {unit} is taken, a guess"
             message += "" if math.isnan(measured) else f"; {shown}"
-            yield _Remark(("sensors",), f"{message}; say `{key}` under `sensors`", is_fault=False)
+            yield Remark(("sensors",), f"{message}; say `{key}` under `sensors`", is_fault=False)
         elif said > LARGEST_NOISE * largest:
             why = f"the fastest tap shows some {largest:.0f} {unit}"
-            yield _Remark(
+            yield Remark(
                 ("sensors", key),
                 f"a noise of {said:g} {unit} cannot be: {why}; {_noise_meant(said, sensor, largest)}",
             )
         elif said < SMALLEST_NOISE[sensor]:
             why = f"no sensor that follows a tap has less than {SMALLEST_NOISE[sensor]:g} {unit}"
-            yield _Remark(
+            yield Remark(
                 ("sensors", key),
                 f"a noise of {said:g} {unit} cannot be: {why}; {_noise_meant(said, sensor, largest)}",
             )
         elif measured > NOISE_TOLERANCE * said:
-            yield _Remark(
+            yield Remark(
                 ("sensors", key),
                 f"a noise of {said:g} {unit} is too little: {shown}; every cycle will look as if the model "
                 "lacked something",
@@ -245,14 +237,14 @@ def _measured_noise(cell: CellConfig, sensor: str) -> float:
     return median(noise) if noise else math.nan
 
 
-def _of_map(cell: CellConfig) -> Iterator[_Remark]:
+def _of_map(cell: CellConfig) -> Iterator[Remark]:
     registers = cell.register_map
     for text in (*unknown_names(registers.registers), *not_promised(registers)):
-        yield _Remark(("module", "register_map"), f"{registers.name}: {text}", is_fault=False)
+        yield Remark(("module", "register_map"), f"{registers.name}: {text}", is_fault=False)
     for text in not_placing(registers) if cell.settings.positioning is not None else ():
-        yield _Remark(("positioning",), f"register map {registers.name}: {text}")
+        yield Remark(("positioning",), f"register map {registers.name}: {text}")
     for place, text, is_fault in doubted_commands(cell):
-        yield _Remark(place, text, is_fault)
+        yield Remark(place, text, is_fault)
     stroke_mm = cell.settings.actuator.stroke_mm
     for name, section, key, value, unit, scale in (
         ("mass", "part", "mass_kg", cell.settings.part.mass_kg, "kg", 1.0),
@@ -260,37 +252,8 @@ def _of_map(cell: CellConfig) -> Iterator[_Remark]:
     ):
         said = scale * registers.constants.get(name, math.nan)
         if value is not None and abs(said - value) > CONSTANT_TOLERANCE * value:
-            yield _Remark(
+            yield Remark(
                 (section, key),
                 f"the {name} is {value:g} {unit} here and always {said:g} {unit} in the register map, which "
                 f"counts; put the constant of {registers.name} right, or take it out",
             )
-
-
-def _of_service(cell: CellConfig) -> Iterator[_Remark]:
-    settings = cell.settings
-    yield from _of_users(settings.opcua.users_file)
-    if settings.journal is not None:
-        if why := refusal(settings.journal.file, cell.name):
-            yield _Remark(("journal", "file"), f"journal.file: {why}")
-    else:
-        yield _Remark((), "no journal: what the cell learns is lost with every restart", is_fault=False)
-
-
-def _of_users(file: Path) -> Iterator[_Remark]:
-    """Say why nobody can log in; a file that is none of users is a fault, for `run` ends with it."""
-    place, add = (
-        ("opcua", "users_file"),
-        f"`impactcell users add {shlex.quote(str(file))} NAME --role engineer`",
-    )
-    nobody = f"nobody can log in, over OPC UA or on the page; run {add}"
-    if not file.exists():
-        yield _Remark(place, f"there is no users file {file}: {nobody}", is_fault=False)
-    elif not os.access(file, os.R_OK):  # its owner's alone, who need not be who checks
-        yield _Remark(place, f"the users file {file} is not yours to read: not looked at", is_fault=False)
-    else:
-        try:
-            if not read_users(file):
-                yield _Remark(place, f"the users file {file} holds nobody: {nobody}", is_fault=False)
-        except AccessError as error:
-            yield _Remark(place, f"opcua.users_file: {error}")

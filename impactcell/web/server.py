@@ -7,12 +7,17 @@ import socket
 import ssl
 import threading
 from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import Final
 from urllib.parse import urlsplit
 
 import uvicorn
 
-from impactcell.errors import SettingsError
+from impactcell.errors import AccessError, SettingsError
+from impactcell.opcua.certificate_dates import ANOTHER_FOR_THE_PAGE, CertificateWatch
+from impactcell.opcua.certificate_files import read_certificate
+from impactcell.process.tls_pair import pair_fault
 from impactcell.scada.users import Users
 from impactcell.web.app import page_app
 from impactcell.web.connections import Connection
@@ -48,8 +53,9 @@ class _CutOff(logging.Filter):
 class _Server(uvicorn.Server):
     """Told when to end, where uvicorn looks for it ten times a second."""
 
-    def __init__(self, config: uvicorn.Config) -> None:
+    def __init__(self, config: uvicorn.Config, watch: CertificateWatch | None) -> None:
         super().__init__(config)
+        self._watch = watch
         self._ending = asyncio.Event()
 
     def end(self) -> None:
@@ -58,8 +64,10 @@ class _Server(uvicorn.Server):
         self._ending.set()
 
     async def main_loop(self) -> None:
-        """Date the answers until the end."""
+        """Date the answers until the end, and tell where the certificate does not hold."""
         while not await self.on_tick(0):
+            if self._watch is not None:
+                self._watch.look(datetime.now(UTC))
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._ending.wait(), DATE_S)
 
@@ -93,6 +101,9 @@ class PageServer:
         SettingsError
             The address cannot be listened on, or certificate and key do not fit.
         """
+        certificate, key = self._settings.certificate, self._settings.key
+        if certificate is not None and key is not None and (fault := pair_fault(certificate, key)):
+            raise SettingsError(f"page: {fault}")
         url = urlsplit(self._settings.endpoint)
         try:
             listener = _listen(url.hostname or "127.0.0.1", url.port or 0)
@@ -107,7 +118,6 @@ class PageServer:
         cell_files = {cell.name: cell.file for cell in self._content.cells if cell.file is not None}
         self._studies = StudyQueue(StudyStore(self._settings.studies), cell_files)
         app = page_app(self._settings, self._content, self.feed, sessions, self._backend, self._studies)
-        certificate, key = self._settings.certificate, self._settings.key
         config = uvicorn.Config(
             app,
             loop="asyncio",
@@ -129,7 +139,7 @@ class PageServer:
         except (OSError, ssl.SSLError) as error:
             listener.close()
             raise SettingsError(f"page: {certificate} and {key} cannot be used: {error}") from error
-        self._server = _Server(config)
+        self._server = _Server(config, None if certificate is None else _watch_of(certificate))
         self._listener = listener
         self._thread = threading.Thread(target=self._run, name="page", daemon=True)
         self._thread.start()
@@ -166,6 +176,14 @@ class PageServer:
         """End the streams first: the server waits for them."""
         self.feed.close()
         self._server.end()
+
+
+def _watch_of(certificate: Path) -> CertificateWatch | None:
+    """Watch the page's certificate; None for one that TLS can use and nothing here can read."""
+    try:
+        return CertificateWatch(read_certificate(certificate), certificate, ANOTHER_FOR_THE_PAGE)
+    except AccessError:
+        return None
 
 
 def _listen(host: str, port: int) -> socket.socket:

@@ -9,7 +9,7 @@ from starlette.responses import RedirectResponse, Response
 
 from impactcell.alarms.rules import journal_fault
 from impactcell.errors import AccessError
-from impactcell.opcua.trust_list import der, read_certificate, thumbprint
+from impactcell.opcua.certificate_files import der, read_certificate, thumbprint
 from impactcell.records import Alarm, ModuleStatus
 from impactcell.scada import RefusedError, Role
 from impactcell.scada.users import User, read_users

@@ -6,17 +6,20 @@ import errno
 import os
 from collections.abc import AsyncIterator, Awaitable
 from dataclasses import replace
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 from asyncua import Client, ua
 from asyncua.crypto import uacrypto
+from cryptography.hazmat.primitives.serialization import Encoding
 
 from impactcell.errors import AccessError
 from impactcell.opcua import login_throttle
 from impactcell.scada import Role, SecurityPolicy, ServerLimits
 from impactcell.scada.users import User, read_users, verify, with_password, write_users
-from tests.opcua_server import CLIENT_URI, PASSWORDS, PATIENT, PatientClient, Site, site
+from tests.certificates import self_signed
+from tests.opcua_server import CLIENT_URI, PASSWORDS, PATIENT, SERVER_URI, PatientClient, Site, site
 from tests.patience import PATIENCE_S
 
 codes = ua.StatusCodes
@@ -42,6 +45,17 @@ async def test_every_policy_with_password() -> None:
             assert await refusal(await here.client("operator", "wrong", policy)) == codes.BadUserAccessDenied
             stranger = await here.client("operator", policy=policy, certificate=here.untrusted())
             assert await refusal(stranger) != 0
+
+
+async def test_an_own_certificate_that_has_ended_is_told(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    now = datetime.now(UTC)
+    begin, end = now - timedelta(days=400), now - timedelta(days=2)
+    self_signed(tmp_path / "pki" / "own", SERVER_URI, begin, end, Encoding.DER)
+    async with site(directory=tmp_path):
+        while f"cert.der: ended on {end:%Y-%m-%d}: move" not in caplog.text:
+            await asyncio.sleep(0)
 
 
 async def test_no_session_without_encryption_unless_allowed() -> None:
@@ -309,8 +323,8 @@ async def test_start_without_what_is_needed(tmp_path) -> None:
 
 
 async def test_user_certificate() -> None:
+    from impactcell.opcua.certificate_files import der, fingerprint
     from impactcell.opcua.certificates import make_certificate, write_pair
-    from impactcell.opcua.trust_list import der, fingerprint
 
     async with site() as here:
         certificate, key = make_certificate("person", "urn:test:person", ["localhost"])

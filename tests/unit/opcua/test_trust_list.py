@@ -15,8 +15,9 @@ from cryptography.x509.oid import NameOID
 
 from impactcell.cli import access
 from impactcell.errors import AccessError
+from impactcell.opcua.certificate_files import application_uris, der, first_of_chain
 from impactcell.opcua.certificates import make_certificate
-from impactcell.opcua.trust_list import TrustList, UntrustedError, application_uris, der, first_of_chain
+from impactcell.opcua.trust_list import TrustList, UntrustedError
 from impactcell.scada import Role
 from impactcell.scada.users import User, Users, read_users, verify, with_password, write_users
 

@@ -1,0 +1,106 @@
+"""The files that a cell's service works with: users, certificates, journal."""
+
+import contextlib
+import os
+import shlex
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+from impactcell.errors import AccessError
+from impactcell.journal.refusal import refusal
+from impactcell.opcua.certificate_dates import ANOTHER_FOR_THE_PAGE, validity_doubt
+from impactcell.opcua.certificate_files import read_certificate
+from impactcell.opcua.own_certificate import (
+    CERTIFICATE,
+    KEY,
+    made_anew,
+    read_own_certificate,
+    read_own_key,
+)
+from impactcell.process.path_kind import Kind, kind_at
+from impactcell.process.tls_pair import pair_fault
+from impactcell.scada.interface import default_application_uri
+from impactcell.scada.users import read_users
+from impactcell.settings.cells import CellConfig
+from impactcell.settings.remark import Remark
+
+
+def of_service(cell: CellConfig) -> Iterator[Remark]:
+    """Say what the service could not use, or nobody would expect, of the files that it works with."""
+    settings = cell.settings
+    yield from _of_users(settings.opcua.users_file)
+    yield from _of_certificates(settings.opcua.certificates_dir)
+    if settings.web is not None and settings.web.certificate is not None and settings.web.key is not None:
+        yield from _of_page(settings.web.certificate, settings.web.key)
+    if settings.journal is not None:
+        if why := refusal(settings.journal.file, cell.name):
+            yield Remark(("journal", "file"), f"journal.file: {why}")
+    else:
+        yield Remark((), "no journal: what the cell learns is lost with every restart", is_fault=False)
+
+
+def _of_users(file: Path) -> Iterator[Remark]:
+    """Say why nobody can log in; a file that is none of users is a fault, for `run` ends with it."""
+    place, add = (
+        ("opcua", "users_file"),
+        f"`impactcell users add {shlex.quote(str(file))} NAME --role engineer`",
+    )
+    nobody = f"nobody can log in, over OPC UA or on the page; run {add}"
+    if not file.exists():
+        yield Remark(place, f"there is no users file {file}: {nobody}", is_fault=False)
+    elif _is_barred(file):
+        yield Remark(place, f"the users file {file} is not yours to read: not looked at", is_fault=False)
+    else:
+        try:
+            if not read_users(file):
+                yield Remark(place, f"the users file {file} holds nobody: {nobody}", is_fault=False)
+        except AccessError as error:
+            yield Remark(place, f"opcua.users_file: {error}")
+
+
+def _of_certificates(directory: Path) -> Iterator[Remark]:
+    """Say why the OPC UA server could not start with its certificate, and where that does not hold."""
+    place = ("opcua", "certificates_dir")
+    files = [directory / "own" / name for name in (CERTIFICATE, KEY)]
+    try:
+        there = [kind_at(file) is not Kind.NOTHING for file in files]
+    except OSError:
+        yield Remark(place, f"{directory / 'own'} is not yours to read: not looked at", is_fault=False)
+        return
+    if not any(there):
+        return  # both are made at the first start
+    unread = [file for file, is_there in zip(files, there, strict=True) if is_there and _is_barred(file)]
+    for file in unread:
+        yield Remark(place, f"{file} is not yours to read: not looked at", is_fault=False)
+    if files[0] in unread:
+        return
+    try:
+        certificate = read_own_certificate(directory, default_application_uri())
+        if doubt := validity_doubt(certificate, datetime.now(UTC)):
+            yield Remark(place, f"{files[0]}: {doubt}: {made_anew(directory)}", is_fault=False)
+        if files[1] not in unread:
+            read_own_key(directory, certificate)
+    except AccessError as error:
+        yield Remark(place, f"opcua.certificates_dir: {error}")
+
+
+def _of_page(certificate: Path, key: Path) -> Iterator[Remark]:
+    """Say why the page could not start with its certificate, and where that does not hold."""
+    unread = {name: file for name, file in (("certificate", certificate), ("key", key)) if _is_barred(file)}
+    for name, file in unread.items():
+        yield Remark(("web", name), f"{file} is not yours to read: not looked at", is_fault=False)
+    if not unread and (fault := pair_fault(certificate, key)):
+        name = "key" if fault.startswith(f"{key}:") else "certificate"
+        yield Remark(("web", name), f"web.{name}: {fault}")
+    elif certificate not in unread.values():
+        with contextlib.suppress(AccessError):  # TLS may be able to use what cannot be read here
+            doubt = validity_doubt(read_certificate(certificate), datetime.now(UTC))
+            if doubt:
+                message = f"{certificate}: {doubt}: {ANOTHER_FOR_THE_PAGE}"
+                yield Remark(("web", "certificate"), message, is_fault=False)
+
+
+def _is_barred(file: Path) -> bool:
+    """Whether a file is its owner's alone, who need not be who checks."""
+    return not os.access(file, os.R_OK)
