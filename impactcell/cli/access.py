@@ -14,7 +14,8 @@ from impactcell.opcua.certificate_dates import validity_mark
 from impactcell.opcua.certificate_files import der, fingerprint, read_certificate, thumbprint
 from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
 from impactcell.opcua.host_interface import Role
-from impactcell.opcua.trust_list import FOLDERS, make_folders
+from impactcell.opcua.own_certificate import KEY
+from impactcell.opcua.trust_list import FOLDERS, is_revocation_list, make_folders
 from impactcell.process.console import print_result
 from impactcell.process.path_kind import Kind
 from impactcell.scada.interface import default_application_uri
@@ -180,9 +181,15 @@ def list_certs(pki: Path) -> None:
     now = datetime.now(UTC)
     for folder in FOLDERS:
         for path in sorted((pki / folder).glob("*")):
+            if path.name == KEY or path.name.startswith("."):
+                continue
             try:
                 certificate = read_certificate(path)
-            except AccessError:
+            except AccessError as error:
+                if folder != "revoked":
+                    _say(f"{folder:9} cannot be used: {error}")
+                elif not is_revocation_list(path):
+                    _say(f"{folder:9} cannot be used: {path}: no revocation list in PEM or DER")
                 continue
             until = f"{certificate.not_valid_after_utc:%Y-%m-%d}"
             subject = certificate.subject.rfc4514_string()

@@ -70,6 +70,15 @@ def _parse_revocations(data: bytes) -> x509.CertificateRevocationList:
         raise ValueError(f"not a revocation list: {error}") from error
 
 
+def is_revocation_list(path: Path) -> bool:
+    """Whether a file is a list that a folder `revoked` is for."""
+    try:
+        _parse_revocations(path.read_bytes())
+    except (OSError, ValueError):
+        return False
+    return True
+
+
 def make_folders(directory: Path) -> None:
     """Make the folders of a pki directory, those that are not there; raises `AccessError` if it cannot."""
     for folder in FOLDERS:

@@ -11,6 +11,7 @@ import pytest
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import rsa
+from cryptography.hazmat.primitives.serialization import Encoding
 from cryptography.x509.oid import NameOID
 
 from impactcell.cli import access
@@ -292,6 +293,31 @@ def test_user_commands(
         access.remove_user(file, "anna")
     with pytest.raises(AccessError, match="is not there"):
         access.list_users(tmp_path / "none.yaml")
+
+
+def test_what_is_no_certificate_is_listed_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The server ignores such a file; who put it there saw nothing of it."""
+    pki, now = tmp_path / "pki", dt.datetime.now(dt.UTC)
+    access.make_certs(pki, URI)
+    (pki / "trusted" / "scada.crt").write_text("not one")
+    (pki / "trusted" / ".keep").touch()
+    revoked = (
+        x509.CertificateRevocationListBuilder()
+        .issuer_name(certificate("ca", 0).subject)
+        .last_update(now)
+        .next_update(now + dt.timedelta(days=1))
+        .sign(key(0), hashes.SHA256())
+    )
+    (pki / "revoked" / "ca.crl").write_bytes(revoked.public_bytes(Encoding.DER))
+    (pki / "revoked" / "other.crl").write_text("not one")
+    capsys.readouterr()
+    access.list_certs(pki)
+    own, *others = capsys.readouterr().out.splitlines()
+    assert own.startswith("own ")
+    assert others == [
+        f"trusted   cannot be used: {pki}/trusted/scada.crt: no certificate in PEM or DER",
+        f"revoked   cannot be used: {pki}/revoked/other.crl: no revocation list in PEM or DER",
+    ]
 
 
 def test_certificate_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
