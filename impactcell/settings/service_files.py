@@ -34,8 +34,7 @@ def of_service(cell: CellConfig) -> Iterator[Remark]:
     if settings.web is not None and settings.web.certificate is not None and settings.web.key is not None:
         yield from _of_page(settings.web.certificate, settings.web.key)
     if settings.journal is not None:
-        if why := refusal(settings.journal.file, cell.name):
-            yield Remark(("journal", "file"), f"journal.file: {why}")
+        yield from _of_journal(settings.journal.file, cell.name)
     else:
         yield Remark((), "no journal: what the cell learns is lost with every restart", is_fault=False)
 
@@ -99,6 +98,21 @@ def _of_page(certificate: Path, key: Path) -> Iterator[Remark]:
             if doubt:
                 message = f"{certificate}: {doubt}: {ANOTHER_FOR_THE_PAGE}"
                 yield Remark(("web", "certificate"), message, is_fault=False)
+
+
+def _of_journal(file: Path, cell: str) -> Iterator[Remark]:
+    """Say why the service could not have its journal there, and where it could not be written."""
+    place = ("journal", "file")
+    if why := refusal(file, cell):
+        yield Remark(place, f"journal.file: {why}")
+        return
+    own = Path(os.path.realpath(file))
+    needed = [own.parent, *(own.with_name(f"{own.name}{end}") for end in ("", "-wal", "-shm", ".lock"))]
+    for one in needed:
+        if os.path.lexists(one) and not os.access(one, os.W_OK):
+            message = f"journal.file: {one} is not yours to write: a service that you start waits until it is"
+            yield Remark(place, message, is_fault=False)
+            return
 
 
 def _is_barred(file: Path) -> bool:
