@@ -21,6 +21,7 @@ from impactcell.process.path_kind import Kind
 from impactcell.scada.interface import default_application_uri
 from impactcell.scada.rights import matrix_table
 from impactcell.scada.users import User, read_users, with_password, write_users
+from impactcell.settings.fields import module_host
 
 MIN_PASSWORD = 8
 """Characters of a password, at least (NIST SP 800-63B, 5.1.1.2)."""
@@ -121,8 +122,13 @@ def make_certs(pki: Path, application_uri: str | None = None, hosts: list[str] |
     Raises
     ------
     AccessError
-        There is a certificate already, or the directory cannot be written.
+        There is a certificate already, the directory cannot be written, or a host is none.
     """
+    for host in hosts or ():
+        try:
+            module_host(host)
+        except ValueError as error:
+            raise AccessError(f"--host {host!r}: {error}") from error
     check_directory(pki, AccessError)
     uri = application_uri or default_application_uri()
     certificate, key = make_certificate("impactcell", uri, [*(hosts or []), *own_hosts()])

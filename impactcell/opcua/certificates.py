@@ -46,7 +46,7 @@ def make_certificate(
         try:
             names.append(x509.IPAddress(ipaddress.ip_address(host)))
         except ValueError:
-            names.append(x509.DNSName(host))
+            names.append(x509.DNSName(host.encode("idna").decode()))
     usage = x509.KeyUsage(
         digital_signature=True,
         content_commitment=True,

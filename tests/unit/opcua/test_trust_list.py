@@ -16,7 +16,7 @@ from cryptography.x509.oid import NameOID
 
 from impactcell.cli import access
 from impactcell.errors import AccessError
-from impactcell.opcua.certificate_files import application_uris, der, first_of_chain
+from impactcell.opcua.certificate_files import application_uris, der, first_of_chain, parse_certificate
 from impactcell.opcua.certificates import make_certificate
 from impactcell.opcua.trust_list import TrustList, UntrustedError
 from impactcell.scada import Role
@@ -293,6 +293,21 @@ def test_user_commands(
         access.remove_user(file, "anna")
     with pytest.raises(AccessError, match="is not there"):
         access.list_users(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize("host", ["bad host", "", "opc.tcp://press-1:4840", "press-1..plant", "1.2.3"])
+def test_a_certificate_is_made_for_no_host_that_cannot_be(tmp_path: Path, host: str) -> None:
+    with pytest.raises(AccessError, match=rf"^--host '{host}': a host"):
+        access.make_certs(tmp_path / "pki", URI, ["press-1.local", host])
+    assert not list(tmp_path.iterdir())
+
+
+def test_hosts_are_in_the_certificate_as_the_network_writes_them(tmp_path: Path) -> None:
+    access.make_certs(tmp_path, URI, ["münchen.example", "10.0.0.5", "fe80::1"])
+    made = parse_certificate((tmp_path / "own" / "cert.der").read_bytes())
+    names = made.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
+    assert "xn--mnchen-3ya.example" in names.get_values_for_type(x509.DNSName)
+    assert {"10.0.0.5", "fe80::1"} <= set(map(str, names.get_values_for_type(x509.IPAddress)))
 
 
 def test_what_is_no_certificate_is_listed_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
