@@ -86,8 +86,10 @@ def remove_user(file: Path, name: str) -> None:
     Raises
     ------
     AccessError
-        There is no such user, or the file cannot be used.
+        There is no such user or no such file, or it cannot be used.
     """
+    if kind_of(file, AccessError) is Kind.NOTHING:
+        raise AccessError(f"{file}: is not there; name the cell's `opcua.users_file`")
     users = read_users(file)
     if name not in users:
         raise AccessError(f"{file}: there is no user {name!r}; see `impactcell users list {file}`")

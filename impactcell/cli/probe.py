@@ -8,7 +8,14 @@ from pathlib import Path
 from typing import Final
 
 from impactcell.cell.preprocessing import fill_defaults
-from impactcell.errors import ConnectionLostError, FieldbusError, LinkError, NoAnswerError, WrongDeviceError
+from impactcell.errors import (
+    ConnectionLostError,
+    FieldbusError,
+    LinkError,
+    NoAnswerError,
+    ProtocolError,
+    WrongDeviceError,
+)
 from impactcell.features import extract, impulse_balance
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.cycle_dates import clock_ahead, seconds_ahead
@@ -81,6 +88,13 @@ def _hint(config: CellConfig, error: FieldbusError) -> str:
         )
     if isinstance(error, LinkError):
         return f"; see {config.place('module.host', 'module.port')}"
+    if isinstance(error, ProtocolError) and "of the status block" in str(error):
+        register_map = config.settings.module.register_map
+        _, positions = yaml_loader.load(register_map)
+        return (
+            f"; addresses of map {config.register_map.name} may be another module's, or off by one: compare "
+            f"them with its manual; see {register_map}:{positions.key(('registers', 'status_crc32'))}"
+        )
     return f"; see {_line_of(config, str(error))}" if isinstance(error, WrongDeviceError) else ""
 
 

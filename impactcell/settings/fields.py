@@ -24,14 +24,20 @@ def _resolved(value: object, info: ValidationInfo) -> object:
     return path
 
 
+def _no_directory(path: Path) -> Path:
+    if path.is_dir():
+        raise ValueError(f"{path} is a directory; a file is needed here")
+    return path
+
+
 def _existing_file(path: Path) -> Path:
-    if not path.is_file():
+    if not _no_directory(path).is_file():
         raise ValueError(f"there is no file {path}")
     return path
 
 
 def _existing_model(path: Path) -> Path:
-    if not path.is_file():
+    if not _no_directory(path).is_file():
         raise ValueError(
             f"there is no file {path}; `impactcell init` writes a first model, fitted to taps (`--campaign`) "
             "or to record the first ones with"
@@ -40,9 +46,7 @@ def _existing_model(path: Path) -> Path:
 
 
 def _existing_parent(path: Path) -> Path:
-    if path.is_dir():
-        raise ValueError(f"{path} is a directory; a file is needed here")
-    if not path.parent.is_dir():
+    if not _no_directory(path).parent.is_dir():
         raise ValueError(f"there is no directory {path.parent} to write it in")
     return path
 

@@ -62,6 +62,27 @@ async def test_what_is_wrong_is_named(tmp_path: Path, change: dict[str, object],
     assert next(iter(change)) in lines.splitlines()[int(place[2]) - 1]
 
 
+async def test_addresses_that_are_off_by_one_lead_to_the_map(tmp_path: Path) -> None:
+    content = yaml.safe_load((CONFIG / "maps" / "fpga-v1.yaml").read_text())
+    for register in content["registers"].values():
+        register["address"] += 1
+        register.pop("expect", None)
+    wrong = tmp_path / "wrong.yaml"
+    wrong.write_text(yaml.safe_dump(content))
+    async with simulator(tmp_path, strikes={"period_s": 0.1}) as module:
+        cell = write_cell(tmp_path, module["port"], module={"timeout_ms": 4000, "register_map": str(wrong)})
+        code, out, err = await probed(cell)
+    assert (code, out) == (1, "")
+    place = re.search(
+        r"press-1: .* 8 readings of the status block do not fit its CRC; addresses of map fpga-v1 may be .*, "
+        rf"or off by one: .*; see {re.escape(str(wrong))}:(\d+):\d+$",
+        err,
+        re.MULTILINE,
+    )
+    assert place is not None, err
+    assert "status_crc32:" in wrong.read_text().splitlines()[int(place[1]) - 1]
+
+
 @pytest.mark.parametrize("transport", ["tcp", "rtu_over_tcp", "udp"])
 async def test_a_module_that_stays_silent_has_its_device_id_named(tmp_path: Path, transport: str) -> None:
     """A module may answer no device_id but its own, or no client but its first."""

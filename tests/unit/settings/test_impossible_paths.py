@@ -91,6 +91,15 @@ def test_a_directory_where_a_file_is_in_its_way_is_told(
     read_cell(cell_file(tmp_path, key, "not/there/yet"))
 
 
+@pytest.mark.parametrize("key", ["module.register_map", "model", "web.certificate", "journal.file"])
+def test_a_directory_where_a_file_is_needed_is_told(tmp_path: Path, key: str) -> None:
+    """It was told not to be there."""
+    told = rf"cell\.yaml:\d+:\d+: {re.escape(key)}: {tmp_path} is a directory; a file is needed here$"
+    with pytest.raises(SettingsError) as caught:
+        read_cell(cell_file(tmp_path, key, "."))
+    assert re.search(told, str(caught.value), re.MULTILINE), caught.value
+
+
 def test_a_journal_that_is_none_is_told_by_check_as_by_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
