@@ -70,7 +70,7 @@ def late_onset(force: Channel | None) -> int | None:
 
 
 def is_late(lateness_s: float, step_s: float, *, is_stated: bool) -> bool:
-    """Whether contact is so far from t = 0 that this is not meant by it; `is_stated`: samples lie before it."""
+    """Whether contact is so far from t = 0 that this is not meant by it; `is_stated`: samples lie before."""
     return abs(lateness_s) >= max(MIN_LATE_STEPS * step_s, STATED_LATE_S if is_stated else MIN_LATE_S)
 
 
