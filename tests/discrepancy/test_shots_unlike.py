@@ -30,6 +30,18 @@ def scaled(channel: Channel | None, factor: float) -> Channel:
     return replace(channel, values=factor * channel.values)
 
 
+def ends_at(shot: Capture, end_s: float) -> Capture:
+    """Give a shot of which all channels end while the actuator pushes."""
+
+    def cut(channel: Channel | None) -> Channel | None:
+        if channel is None:
+            return None
+        kept = channel.time_s < end_s
+        return replace(channel, time_s=channel.time_s[kept], values=channel.values[kept])
+
+    return replace(shot, force=cut(shot.force), position=cut(shot.position), actuator=cut(shot.actuator))
+
+
 def with_wrong(given: Campaign, change: Callable[[Capture], Capture], *numbers: int) -> Campaign:
     return replace(
         given, shots=tuple(change(shot) if shot.cycle in numbers else shot for shot in given.shots)
@@ -46,6 +58,7 @@ def with_wrong(given: Campaign, change: Callable[[Capture], Capture], *numbers: 
         (lambda s: replace(s, position=scaled(s.position, 1e3)), r"position_m or time_s .*about 1e\+3"),
         (lambda s: replace(s, force=scaled(s.force, -1.0)), "force_n pulls with .* turn its sign"),
         (lambda s: replace(s, position=scaled(s.position, 0.0)), "position is constant|does not move"),
+        (lambda s: ends_at(s, 0.008), r"record ends \d\.?\d* ms after contact, while .*: record until"),
     ],
 )
 def test_a_shot_of_which_a_column_is_wrong_is_left_out_and_told(

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from impactcell.discrepancy.data.prepared_shots import FORCE, PreparedShot
+from impactcell.discrepancy.data.prepared_shots import FORCE, POSITION, PreparedShot
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio, likely_factor
 from impactcell.records import Samples
 
@@ -26,6 +26,10 @@ BESIDE = 1.3
 """Factor beyond which another ratio of an unlike shot is not like the others' either."""
 PULLS = 2.0
 """Times its largest value a force is negative whose sign is wrong."""
+LAST_PART, FEWEST_LAST = 20, 8
+"""Part of a record's positions, and fewest of them, that tell whether it ends in motion."""
+STILL_MOVING = 0.5
+"""Speed at the end over the mean one from which on a part is not at rest; of one that slows down it is 0."""
 SEVERAL = "position_m or time_s"
 """Columns that are wrong where more than one ratio of a shot is not like the others'."""
 
@@ -58,7 +62,9 @@ def unlike_shots(
             if _is_apart(factor[i], BESIDE):
                 factors[place][ratio] = float(factor[i])
     told = {
-        shots[place].number: _pulls(shots[place]) or _told(factors[place], ratios[place])
+        shots[place].number: (
+            _pulls(shots[place]) or _ends_in_motion(shots[place]) or _told(factors[place], ratios[place])
+        )
         for place in sorted(unlike)
     }
     return told if 2 * len(told) < len(shots) else {}
@@ -100,6 +106,22 @@ def _pulls(shot: PreparedShot) -> str:
     if not len(force) or -force.min() < PULLS * max(float(force.max()), 0.0):
         return ""
     return f"its force_n pulls with {-force.min():.4g} N, where a contact only pushes: turn its sign"
+
+
+def _ends_in_motion(shot: PreparedShot) -> str:
+    """Say that a record ends too early, where it does: a speed or a balance of all of it tells of no slip."""
+    times, along = shot.times[POSITION], shot.values[POSITION]
+    last = max(len(along) // LAST_PART, FEWEST_LAST)
+    if len(along) < 2 * last or not along[:-last].std() > 0.0:
+        return ""
+    speed_m_s = abs(float(np.polyfit(times[-last:], along[-last:], 1)[0]))
+    mean_speed_m_s = abs(float(along[-1] - along[0])) / float(times[-1] - times[0])
+    if speed_m_s < STILL_MOVING * mean_speed_m_s:
+        return ""
+    return (
+        f"its record ends {1e3 * times[-1]:.3g} ms after contact, while the part moves at "
+        f"{1e3 * speed_m_s:.3g} mm/s: record until it is at rest"
+    )
 
 
 def _told(off: Mapping[PlausibleRatio, float], known: Mapping[PlausibleRatio, float]) -> str:

@@ -56,6 +56,11 @@ def _left_out(match: re.Match[str]) -> str:
         )
     elif pulls := re.fullmatch(r"its force_n pulls with (\S+) N, .*", why):
         said = f"force_n zieht mit {pulls[1]} N, wo ein Kontakt nur drückt: das Vorzeichen umkehren"
+    elif ends := re.fullmatch(r"its record ends (\S+) ms after contact, while .* at (\S+) mm/s: .*", why):
+        said = (
+            f"die Aufzeichnung endet {ends[1]} ms nach dem Kontakt, während das Teil sich mit {ends[2]} mm/s "
+            "bewegt: bis zur Ruhe aufzeichnen"
+        )
     else:
         said = german_message(why) or ""
     more = f"; aus gleichem Grund auch {others}" if others else ""
