@@ -27,7 +27,7 @@ BESIDE = 1.3
 PULLS = 2.0
 """Times its largest value a force is negative whose sign is wrong."""
 LAST_PART, FEWEST_LAST = 20, 8
-"""Part of a record's positions, and fewest of them, that tell whether it ends in motion."""
+"""Part of a record's positions that tells whether it ends in motion, and as many if there are enough."""
 STILL_MOVING = 0.5
 """Speed at the end over the mean one from which on a part is not at rest; of one that slows down it is 0."""
 SEVERAL = "position_m or time_s"
@@ -111,8 +111,8 @@ def _pulls(shot: PreparedShot) -> str:
 def _ends_in_motion(shot: PreparedShot) -> str:
     """Say that a record ends too early, where it does: a speed or a balance of all of it tells of no slip."""
     times, along = shot.times[POSITION], shot.values[POSITION]
-    last = max(len(along) // LAST_PART, FEWEST_LAST)
-    if len(along) < 2 * last or not along[:-last].std() > 0.0:
+    last = max(len(along) // LAST_PART, min(len(along) // 3, FEWEST_LAST))
+    if last < 2 or not np.ptp(along) > 0.0:
         return ""
     speed_m_s = abs(float(np.polyfit(times[-last:], along[-last:], 1)[0]))
     mean_speed_m_s = abs(float(along[-1] - along[0])) / float(times[-1] - times[0])
