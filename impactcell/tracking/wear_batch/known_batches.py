@@ -111,7 +111,8 @@ def _update_known_batch(
         current = _pass_time(state, current, cycle)
         if batch_id is not None and batch_id != current.current:
             has_been_seen = batch_id in current.batches
-            current = wear_filter.switch_batch(current, batch_id, settings.step_std**2 * variance)
+            step = noise_identification.step_variance(settings, variance, young=_is_young(state, cycle))
+            current = wear_filter.switch_batch(current, batch_id, step)
             if has_been_seen and batch_change_detection.differed_before(settings, state, current, cycle):
                 state = replace(state, tested=True)
     current, error = wear_filter.update(

@@ -41,6 +41,10 @@ EARLIEST_CHANGE = 3
 """Cycles before which no unannounced batch change is believed: an odd first value is no batch. So long the
 filter of known batches is what the bank says, which knows that the first value may be an outlier."""
 
+FIRST_STEP = 4.0
+"""Standard deviation of the step to a batch that comes before that, in that of others: where a step is larger
+than was thought, a level that rests on one or two values gives way instead of the offset."""
+
 INDEX, VALUE, STD, BATCH_CHANGE, BATCH = range(5)
 """Columns of a `CommissioningRecord`."""
 
@@ -175,6 +179,11 @@ def identify_random_walks(
     return best
 
 
+def step_variance(settings: TrackerSettings, variance: float, *, young: bool) -> float:
+    """Prior variance of a step to a batch that is named; `young` before `EARLIEST_CHANGE` cycles."""
+    return (settings.step_std * (FIRST_STEP if young else 1.0)) ** 2 * variance
+
+
 def replay_filter(
     settings: TrackerSettings,
     record: CommissioningRecord,
@@ -196,17 +205,23 @@ def replay_filter(
     unnamed = int(np.argmax(is_named))
     is_first = (rows[:, INDEX] < rows[0, INDEX] + EARLIEST_CHANGE) & (rows[:, BATCH] == rows[0, BATCH])
     begun = 1 if unnamed else len(rows) if is_first.all() else int(np.argmin(is_first))
-    # cycles before the first that was named are the bank's, and say of wear what that makes of them
-    first = record.rows[: unnamed + 1] if unnamed else rows[:begun]
-    replayed = replay_bank(settings, replace(record, rows=first), noise, walks, int(first[0, INDEX]))
-    moments = run_length_bank.moments(replayed.bank)
-    is_beside = present.batches[0] is None
-    state = (wear_filter.beside_reference if is_beside else wear_filter.from_bank)(*moments, names[0])
+    if not unnamed and (rows[1:, BATCH] != rows[0, BATCH]).all():
+        # the bank's moments of one value are mostly those of an outlier, as wide as a step
+        slope_std = settings.slope_std * float(np.sqrt(variances[0]))
+        state = wear_filter.initial_state(rows[0, VALUE], variances[0], slope_std, names[0])
+    else:
+        # cycles before the first that was named are the bank's, and say of wear what that makes of them
+        first = record.rows[: unnamed + 1] if unnamed else rows[:begun]
+        replayed = replay_bank(settings, replace(record, rows=first), noise, walks, int(first[0, INDEX]))
+        moments = run_length_bank.moments(replayed.bank)
+        is_beside = present.batches[0] is None
+        state = (wear_filter.beside_reference if is_beside else wear_filter.from_bank)(*moments, names[0])
     followed = zip(rows[begun - 1 :], rows[begun:], variances[begun:], names[begun:], strict=False)
     for before, row, variance, name in followed:
         passed = int(row[INDEX] - before[INDEX])
         state = wear_filter.predict(state, passed, walks.level**2 * unit, walks.slope**2 * unit)
         if name != state.current:
-            state = wear_filter.switch_batch(state, name, settings.step_std**2 * variance)
+            young = row[INDEX] < record.rows[0, INDEX] + EARLIEST_CHANGE
+            state = wear_filter.switch_batch(state, name, step_variance(settings, variance, young=young))
         state, _ = wear_filter.update(state, row[VALUE], variance, settings.outlier_threshold)
     return state

@@ -185,3 +185,31 @@ def test_a_filter_that_an_earlier_version_began_with_a_late_cycle_stays_as_it_is
         result = wear_batch.update(KNOWN, state, reading)
         state = result.state
         assert result.used
+
+
+@pytest.mark.parametrize("step", [10, 20])
+@pytest.mark.parametrize("first", [1, 2])
+def test_a_first_batch_of_one_or_two_cycles_gives_away_nothing_of_the_step(first, step):
+    """Level and offset were off by up to 3.2 of their standard deviations, all to the same side."""
+    beyond = []
+    for seed in range(12):
+        noise = STD * np.random.default_rng([17, seed]).standard_normal(61)
+        readings = [
+            FrictionObservation(
+                n,
+                0.2 + noise[n] + (step * STD if n > first else 0.0),
+                STD,
+                batch_id="B" if n > first else "A",
+            )
+            for n in range(1, 61)
+        ]
+        results = run(readings)
+        wear, batch = results[-1].wear, results[-1].batch
+        off = (wear.level - 0.2) / wear.level_std, (batch.offset - step * STD) / batch.offset_std
+        beyond.append((*off, wear.level_std))
+        assert any(result.shift for result in results)
+    level, offset, level_std = np.transpose(beyond)
+    for off in (level, offset):
+        assert abs(np.mean(off)) < 3.0 / math.sqrt(len(off))
+        assert np.abs(off).max() < 3.5
+    assert level_std == pytest.approx(STD, rel=0.5)
