@@ -12,15 +12,12 @@ import numpy as np
 from impactcell.records import Samples
 from impactcell.tracking.wear_batch import run_length_bank, wear_filter
 from impactcell.tracking.wear_batch.batch_filter import BankUpdate
-from impactcell.tracking.wear_batch.noise_scale import NoiseScale, scale_change
+from impactcell.tracking.wear_batch.noise_scale import DEGREES_PER_DIFFERENCE, NoiseScale, scale_change
 from impactcell.tracking.wear_batch.settings import BatchKnowledge, TrackerSettings
 from impactcell.tracking.wear_batch.state import ChangePoint, TrackerState, UsableCycle
 
 FEWEST_DIFFERENCES = 18.0
 """Differences that the scale of the noise must rest on before a change is believed."""
-DEGREES_PER_DIFFERENCE = 2.0 / 3.0
-"""Degrees of freedom of a variance from n successive differences, over n (von Neumann 1941, Ann. Math. Stat.
-12:367): neighbours share an estimate."""
 LEARNING_DIFFERENCES = 100.0
 """Differences before which a scale that still moves is waited for."""
 SETTLED = 1.15

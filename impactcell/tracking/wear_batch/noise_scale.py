@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.special import ndtri, stdtrit
 
 from impactcell.numerics import scatter_correlation
 from impactcell.numerics.jit import compiled
@@ -28,8 +29,8 @@ CONSISTENCY = _INSIDE - 2.0 * CLIP * _DENSITY + CLIP**2 * (1.0 - _INSIDE)
 """E min(e^2, CLIP^2) of a standard normal e: what winsorising leaves of the variance."""
 MEDIAN_CHI_SQUARE = 0.4549
 """Median of a squared standard normal."""
-UNSCALED = 6.0
-"""Differences before a guessed scale is good enough to know an outlier."""
+UNSCALED = 11.0
+"""Differences with which a guessed scale is good enough to know an outlier."""
 ROUGH_BIAS = 1.25
 """Factor by which outliers may raise the winsorised factor; those in 2 % of the differences do by 1.11."""
 MEMORY = 5000.0
@@ -38,8 +39,15 @@ DECLARED_WEIGHT = 10.0
 """Differences that a declared standard deviation counts for."""
 GUESSED_RELATIVE_STD = 0.01
 """Standard deviation where none was ever declared, of the value itself."""
-GUESS_DOUBT = 4.0
-"""Over the number of differences that a guessed scale rests on: relative variance added to an estimate's."""
+GUESS_WEIGHT = 0.2
+"""Differences that a guess counts for: values may be nearly the same by chance."""
+DEGREES_PER_DIFFERENCE = 2.0 / 3.0
+"""Degrees of freedom of a variance from n successive differences, over n (von Neumann 1941, Ann. Math. Stat.
+12:367): neighbours share an estimate."""
+UPPER = 0.975
+"""Probability below the upper end of a 95 % interval."""
+FEWEST_DIFFERENCES = 2.0
+"""For fewer a guessed scale is no more in doubt: Student's interval would have no end."""
 CONTRADICTED = 2.0
 """A factor beyond this, or below its inverse, says that the declared scale is no guide."""
 ITERATIONS = 30
@@ -130,7 +138,7 @@ def update(
         std = usual
     else:
         std = usual = max(GUESSED_RELATIVE_STD * abs(value), SMALLEST_GUESS)
-        weight, guessed = 0.0, True
+        weight, guessed = GUESS_WEIGHT, True
     identical = identical_run(noise, value)
     if late:
         return replace(noise, weight=weight, usual_std=usual, guessed=guessed, identical=identical), std
@@ -192,7 +200,7 @@ def _learned_factors(
     """
     (std, usual), posterior, square = stds, noise.exponent_posterior, (value - noise.last_value) ** 2
     squared = square / _variance_of_difference(noise, stds)
-    if guessed and weight <= UNSCALED:
+    if guessed and weight < UNSCALED:
         # nothing to judge outliers by yet: the plain mean
         factor = max(noise.factor + (squared - noise.factor) / weight, SMALLEST_FACTOR)
         return (factor, factor), posterior
@@ -211,13 +219,22 @@ def _learned_factors(
 
 def variance(noise: NoiseScale, std: float) -> float:
     """Variance of an estimate that declares `std`; wider while a guessed scale rests on few differences."""
-    doubt = 1.0 + GUESS_DOUBT / max(noise.weight, 1.0) if noise.guessed else 1.0
-    return float(
-        noise.factor
-        * variance_over_differences(noise.variogram.correlation)
-        * doubt
-        * declared_std_calibration.calibrated_std(noise.exponent_posterior, std, noise.usual_std) ** 2
-    )
+    calibrated = declared_std_calibration.calibrated_std(noise.exponent_posterior, std, noise.usual_std)
+    return float(_believed_factor(noise) * calibrated**2)
+
+
+def is_rough(noise: NoiseScale) -> bool:
+    """Whether the scale is guessed, and rests on too few differences to know an outlier by it."""
+    return noise.guessed and noise.weight < UNSCALED
+
+
+def _believed_factor(noise: NoiseScale) -> float:
+    """Give the factor of the variance; of a guessed scale so much wider as Student's interval is."""
+    factor = noise.factor * variance_over_differences(noise.variogram.correlation)
+    if not noise.guessed:
+        return factor
+    degrees = DEGREES_PER_DIFFERENCE * max(noise.weight, FEWEST_DIFFERENCES)
+    return factor * float((stdtrit(degrees, UPPER) / ndtri(UPPER)) ** 2)
 
 
 def rescaled(noise: NoiseScale, ratio: float) -> NoiseScale:
@@ -244,12 +261,9 @@ def usual_variance(noise: NoiseScale) -> float:
 
 
 def variances(noise: NoiseScale, stds: Samples) -> Samples:
-    """Variances of the estimates of a history, whose noise is now known."""
-    return (
-        noise.factor
-        * variance_over_differences(noise.variogram.correlation)
-        * declared_std_calibration.calibrated_stds(noise.exponent_posterior, stds, noise.usual_std) ** 2
-    )
+    """Variances of the estimates of a history by what is now known of their noise, each as `variance`."""
+    calibrated = declared_std_calibration.calibrated_stds(noise.exponent_posterior, stds, noise.usual_std)
+    return _believed_factor(noise) * calibrated**2
 
 
 def scale_change(noise: NoiseScale, since: NoiseScale, stds: Samples) -> tuple[float, float]:
@@ -260,6 +274,9 @@ def scale_change(noise: NoiseScale, since: NoiseScale, stds: Samples) -> tuple[f
 
 def refit(noise: NoiseScale, values: Samples, stds: Samples) -> NoiseScale:
     """Fit the factor to all of the first values at once: from a wrong one it takes long to come up."""
+    if is_rough(noise):
+        # its plain mean is all there is
+        return noise
     unscaled = declared_std_calibration.calibrated_stds(noise.exponent_posterior, stds, noise.usual_std) ** 2
     squared = np.diff(values) ** 2 / (unscaled[1:] + unscaled[:-1])
     # by the median, which outliers hardly move

@@ -33,7 +33,7 @@ def commission(
     is_ended = due >= settings.commissioning_cycles
     identifies = is_ended or due in noise_identification.IDENTIFIED_AT
     state = replace(state, commissioning=None if is_ended else record)
-    if cycles in noise_identification.REFITTED_AT:
+    if cycles in noise_identification.REFITTED_AT or noise_scale.is_rough(state.noise):
         values, stds = record.rows[:, noise_identification.VALUE], record.rows[:, noise_identification.STD]
         state = replace(state, noise=noise_scale.refit(state.noise, values, stds))
     elif not identifies:
