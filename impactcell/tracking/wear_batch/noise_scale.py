@@ -144,7 +144,8 @@ def update(
         return replace(noise, weight=weight, usual_std=usual, guessed=guessed, identical=identical), std
     factors, posterior = (noise.factor, noise.winsorised_factor), noise.exponent_posterior
     watched, latest = noise.watched_ratio, noise.latest_ratio
-    if not math.isnan(noise.last_value):
+    # values that have not differed yet say nothing of how they scatter: a guess stays
+    if not (math.isnan(noise.last_value) or (guessed and weight < 1.0 and identical > 1)):
         weight = min(weight + 1.0, MEMORY)
         factors, posterior = _learned_factors(noise, value, (std, usual), weight, guessed=guessed)
         watched, latest = _watched_ratios(noise, value, (std, usual))

@@ -78,3 +78,16 @@ def test_few_values_without_standard_deviations_are_as_unsure_as_they_are(cycles
 def test_four_values_three_of_which_are_all_but_the_same_do_not_hide_the_truth():
     wear = impactcell.track(np.arange(4), [0.2005, 0.2035, 0.2033, 0.2035]).wear
     assert abs(wear.level - 0.2003) < 2.0 * wear.level_std < 0.01
+
+
+@pytest.mark.parametrize("cycles", [2, 4])
+def test_values_that_do_not_differ_are_no_better_than_the_guess(cycles):
+    """The level was 0.20000 ± 0.00000 from the fourth on."""
+    wear = impactcell.track(np.arange(cycles), np.full(cycles, 0.2)).wear
+    assert wear.level == pytest.approx(0.2)
+    assert wear.level_std > GUESSED_RELATIVE_STD * 0.2 / np.sqrt(cycles)
+
+
+def test_the_first_difference_is_the_first_that_is_learned_from():
+    wear = impactcell.track(np.arange(7), [0.2, 0.2, 0.2, 0.2, 0.201, 0.199, 0.2004]).wear
+    assert 1e-4 < wear.level_std < 3e-3
