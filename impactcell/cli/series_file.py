@@ -161,13 +161,13 @@ def _reading(cells: dict[str, str], decimal: str) -> tuple[FrictionObservation, 
 
 
 def _number(name: str, cell: str, decimal: str) -> tuple[float, str]:
-    """Give a number, and what is wrong with it; an empty cell is a missing one."""
+    """Give a number, and what is wrong with it; nan for a cell that is empty or says that there is none."""
     if not cell:
         return math.nan, ""
     value = math.inf if cell.lower().lstrip("+-") in INFINITE else parse_number(cell, decimal)
     if value is None or is_grouped(cell, decimal):
         mark = "point" if decimal == "." else "comma"
         return math.nan, f"{name} `{cell}` is not a number with decimal {mark}; leave it empty if missing"
-    if name == "mu_s_std" and not math.isfinite(value):
+    if name == "mu_s_std" and (value < 0.0 or math.isinf(value)):
         return value, f"{name} `{cell}` is no standard deviation; leave it empty if it is not known"
     return value, ""

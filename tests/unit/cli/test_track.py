@@ -196,7 +196,7 @@ def test_a_limit_that_is_not_reached_is_told_in_words(tmp_path, capsys):
         ),
         ('cycle,mu_s\n1,0.2\n"2,0.2\n3,0.2\n', ":3: its quotes do not fit"),
         ('cycle,mu_s,batch\n1,0.2,"a\nb"\n2,x,c\n', ":4: mu_s `x` is not a number"),
-        ("cycle,mu_s,mu_s_std\n1,0.2,0.1\n2,0.2,nan\n", ":3: mu_s_std `nan` is no standard deviation"),
+        ("cycle,mu_s,mu_s_std\n1,0.2,0.1\n2,0.2,-1\n", ":3: mu_s_std `-1` is no standard deviation"),
         ("cycle,mu_s,mu_s_std\n1,0.2,inf\n", ":2: mu_s_std `inf` is no standard deviation"),
         (
             "cycle,mu_s,mu_s_std\n1,nan,0.1\n2,inf,0.1\n",
@@ -283,6 +283,18 @@ def test_a_batch_is_missing_by_the_words_by_which_a_number_is(tmp_path, capsys, 
     expected = run(capsys, write(tmp_path / "s.csv", truth(60, at=0), batch=names))
     told = run(capsys, write(tmp_path / "s.csv", truth(60, at=0), batch=[name or word for name in names]))
     assert told == expected
+
+
+@pytest.mark.parametrize("word", ["nan", "NA", "-", "#N/A", "null"])
+def test_a_standard_deviation_is_missing_by_the_words_by_which_mu_s_is(tmp_path, capsys, word):
+    rows = [f"{n},{0.2 + 0.001 * (n % 3):g},{{}}" for n in range(30)]
+    written = ["\n".join(["cycle,mu_s,mu_s_std", *rows]).replace("{}", cell) for cell in (word, "")]
+    said = []
+    for text in written:
+        path = tmp_path / "s.csv"
+        path.write_text(text)
+        said.append(run(capsys, path))
+    assert said[0] == said[1]
 
 
 def test_columns_that_are_not_read_are_told(tmp_path, capsys):
