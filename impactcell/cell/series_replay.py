@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from impactcell import alarms
-from impactcell.alarms import AlarmSettings, CycleInputs, Notification
+from impactcell.alarms import AlarmSetState, AlarmSettings, CycleInputs, Notification
 from impactcell.alarms.rules import batch_shift
 from impactcell.cell import series_runs
 from impactcell.errors import SeriesError
@@ -44,11 +44,14 @@ class RaisedAlarm:
     evidence : Evidence
         What was compared with what, when the change began and how large it is; of a batch shift, as the
         cycles after it came to see it.
+    cleared_cycle : int or None
+        At which its condition was over; None while it stands. A batch shift is an event, and has none.
     """
 
     alarm: str
     cycle: int
     evidence: Evidence
+    cleared_cycle: int | None = None
 
     @property
     def withdrawn(self) -> bool:
@@ -152,6 +155,8 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
             observation.time_ns,
             announced=result.expected,
         )
+        if transitions:
+            raised = [_cleared(alarm, alarm_set, observation.cycle) for alarm in raised]
         raised.extend(
             RaisedAlarm(event.alarm.name, observation.cycle, event.alarm.evidence)
             for event in transitions
@@ -190,6 +195,12 @@ def whole_number_fault(cycle: float) -> str:
     if cycle > LARGEST_CYCLE:
         return f"is larger than {LARGEST_CYCLE}, up to which cycles are counted"
     return ""
+
+
+def _cleared(raised: RaisedAlarm, alarm_set: AlarmSetState, cycle: int) -> RaisedAlarm:
+    """Keep the cycle at which what stood is found to be over."""
+    is_over = raised.alarm != batch_shift.NAME and not alarm_set.alarm(raised.alarm).active
+    return replace(raised, cleared_cycle=cycle) if is_over and raised.cleared_cycle is None else raised
 
 
 def _refined(raised: RaisedAlarm, batch: BatchState) -> RaisedAlarm:

@@ -117,6 +117,7 @@ def _as_json(series: TrackedSeries) -> dict[str, object]:
                 "threshold": r.evidence.threshold,
                 "false_alarm_cycles": _finite(r.evidence.false_alarm_cycles),
                 "withdrawn": r.withdrawn,
+                "cleared_cycle": r.cleared_cycle,
             }
             for r in series.alarms
         ],
@@ -173,7 +174,18 @@ def _alarm_line(raised: RaisedAlarm, series: TrackedSeries) -> str:
         return f"{begin}changed at {evidence.change_cycle}, {size}{end}"
     passed = _passed(raised, series) if raised.alarm == wear_limit.NAME else ""
     off = plus_minus(abs(evidence.size), evidence.size_std, ".5f")
-    return f"{begin}{passed}level {off} {'above' if evidence.size > 0.0 else 'below'} the limit"
+    side = "above" if evidence.size > 0.0 else "below"
+    return f"{begin}{passed}level {off} {side} the limit{_end(raised, series)}"
+
+
+def _end(raised: RaisedAlarm, series: TrackedSeries) -> str:
+    """Say since when a condition is over; not of a warning where what it warned of has come, and stands."""
+    over = raised.cleared_cycle
+    if over is None:
+        return ""
+    standing = [a for a in series.alarms if a.alarm == wear_limit.NAME and a.cleared_cycle is None]
+    has_come = raised.alarm != wear_limit.NAME and any(alarm.cycle <= over for alarm in standing)
+    return "" if has_come else f"; gone since cycle {over}"
 
 
 def _passed(raised: RaisedAlarm, series: TrackedSeries) -> str:

@@ -74,3 +74,13 @@ def test_a_shift_that_may_as_well_be_none_by_now_is_withdrawn() -> None:
     assert [alarm.withdrawn for alarm in tracked.alarms] == [False, False, False, True]
     assert not RaisedAlarm("WearLimit", 9, Evidence(size=0.001, size_std=0.002)).withdrawn
     assert not RaisedAlarm("BatchShift", 9, Evidence()).withdrawn
+
+
+def test_an_alarm_of_wear_that_is_over_has_the_cycle_at_which_it_was() -> None:
+    falling = 0.25 - 1e-4 * np.arange(400)
+    (alarm,) = replay(TrackerSettings(wear_limit=LIMIT), observed(falling)).alarms
+    assert alarm.alarm == "WearLimit"
+    assert alarm.cleared_cycle is not None
+    assert abs(alarm.cleared_cycle - 200) < 60
+    standing = replay(TrackerSettings(wear_limit=LIMIT), observed(falling[:120])).alarms
+    assert [alarm.cleared_cycle for alarm in standing] == [None]

@@ -104,6 +104,28 @@ def test_a_limit_that_was_passed_from_the_first_cycle_on_was_not_seen_to_be_pass
     assert "about" not in line
 
 
+def test_an_alarm_of_wear_that_is_over_is_told_so(tmp_path, capsys):
+    path = write(tmp_path / "s.csv", truth(300, slope=-1e-4, at=300) + 0.07)
+    (alarm,) = run(capsys, path, limit=0.25)["alarms"]
+    track(path, limit=0.25)
+    line = capsys.readouterr().out.splitlines()[-1]
+    assert line.startswith("WearLimit at cycle ")
+    assert line.endswith(f" above the limit; gone since cycle {alarm['cleared_cycle']}")
+
+
+def test_a_warning_of_what_has_come_is_not_told_to_be_over(tmp_path, capsys):
+    path = write(tmp_path / "s.csv", truth(1200, slope=3e-5, at=1200))
+    warning, limit = run(capsys, path, limit=0.23)["alarms"]
+    assert warning["cleared_cycle"] >= limit["cycle"]
+    assert limit["cleared_cycle"] is None
+    track(path, limit=0.23)
+    told = [line for line in capsys.readouterr().out.splitlines() if line.startswith("Wear")]
+    assert [line.rpartition(" ± ")[2].split(" ", 1)[1] for line in told] == [
+        "below the limit",
+        "above the limit",
+    ]
+
+
 def test_missing_stds_missing_cycles_and_missing_values(tmp_path, capsys):
     rng = np.random.default_rng(2)
     kept = np.sort(rng.choice(600, 450, replace=False))
