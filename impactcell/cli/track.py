@@ -67,8 +67,9 @@ def track(
         tracked = replay(settings, file.observations)
     except SeriesError as error:
         raise SeriesError(f"{series}: {error}") from error
+    doubt = _doubt(file)
     if tracked.used < FEWEST_CYCLES:
-        why = f"; {tracked.notes[0][1]}" if tracked.notes else ""
+        why = "".join(f"; {said}" for said in (*(note for _, note in tracked.notes[:1]), doubt) if said)
         raise SeriesError(
             f"{series}: only {tracked.used} of {len(file.observations)} cycles can be used, "
             f"it takes {FEWEST_CYCLES}{why}"
@@ -80,10 +81,18 @@ def track(
             f"{series}: no standard deviations (`mu_s_std`): {100.0 * GUESSED_RELATIVE_STD:g} % of mu_s is "
             "taken, and learned from the scatter of the series; add them where they are known"
         )
+    if doubt:
+        print_note(f"{series}: mu_s: {doubt}")
     if limit is not None and (doubt := FRICTION.doubt(limit)):
         print_note(f"--limit: {doubt}")
     text = json.dumps(_as_json(tracked)) if as_json else _as_text(tracked)
     sys.stdout.write(text + "\n")
+
+
+def _doubt(file: SeriesFile) -> str:
+    """Say that the mu_s of a file are hardly meant, as those in %; empty where they may be."""
+    given = [seen.mu_s for seen in file.observations if math.isfinite(seen.mu_s)]
+    return FRICTION.doubt(float(np.median(given))) if given else ""
 
 
 def _unread(series: Path, file: SeriesFile) -> str:

@@ -401,6 +401,21 @@ def test_a_limit_in_per_cent_is_refused_or_doubted(tmp_path, capsys):
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.parametrize("percent", [20, 5])
+def test_friction_in_per_cent_is_told_as_a_limit_in_per_cent_is(tmp_path, capsys, percent):
+    path = tmp_path / "s.csv"
+    path.write_text("".join(["cycle,mu_s\n", *(f"{n},{percent + 0.1 * (n - 2):g}\n" for n in range(5))]))
+    doubt = f"a friction coefficient of {percent} is hardly meant, where taps have 0.01 to 1.5: if that was "
+    doubt += f"meant in %, write {0.01 * percent:g}"
+    if percent > 10:
+        with pytest.raises(SeriesError, match=r"only 0 of 5 cycles can be used, .* is outside 0") as refused:
+            track(path)
+        assert str(refused.value).endswith(f"; {doubt}")
+    else:
+        track(path)
+        assert f"{path}: mu_s: {doubt}\n" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("column", [True, False])
 def test_what_stands_in_for_standard_deviations_is_told(tmp_path, capsys, column):
     path = write(tmp_path / "s.csv", truth(60, at=0), std=None)
