@@ -41,6 +41,22 @@ GERMAN: Final = {
         + _PROBABLY_GERMAN + " zu weit",
     r"no tap up to (?P<a>\S+) m/s and (?P<b>\S+) mm moves a part of (?P<c>\S+) kg at friction (?P<d>\S+)":
         r"kein Stoß bis \g<a> m/s und \g<b> mm bewegt ein Teil von \g<c> kg bei einer Reibung von \g<d>",
+    r"no tap within (?P<key>\S+), (?P<a>\S+) N, moves a part of (?P<b>\S+) kg at friction (?P<c>\S+); "
+    r"the gentlest that does may take (?P<d>\S+) N":
+        r"kein Stoß innerhalb von \g<key>, \g<a> N, bewegt ein Teil von \g<b> kg bei einer Reibung von "
+        r"\g<c>; der sanfteste, der es bewegt, kann \g<d> N erreichen",
+    r"a part of (?P<a>\S+) kg is too light to plan for: below (?P<b>\S+) kg the damping of the contact "
+    r"keeps it from springing back":
+        r"ein Teil von \g<a> kg ist zu leicht, um Stöße zu planen: unter \g<b> kg hält die Dämpfung des "
+        r"Kontakts es davon ab zurückzufedern",
+    r"the part cannot lie at (?P<a>\S+) m, far beyond the travel of (?P<b>\S+) to (?P<c>\S+) m; "
+    r"positions are in metres":
+        r"das Teil kann nicht bei \g<a> m liegen, weit außerhalb des Verfahrwegs von \g<b> bis \g<c> m; "
+        r"Positionen werden in Metern angegeben",
+    r"the part cannot lie at (?P<a>\S+) m; positions are in metres":
+        r"das Teil kann nicht bei \g<a> m liegen; Positionen werden in Metern angegeben",
+    r"the part cannot lie (?P<a>\S+) m from its target; distances are in metres":
+        r"das Teil kann nicht \g<a> m von seinem Ziel liegen; Abstände werden in Metern angegeben",
     _REMAIN + r"and every tap for a part of (?P<b>\S+) kg overshoots (?P<c>\S+) µm " + _PROBABLY
     + r" \(the safest with (?P<d>\S+)\)":
         _REMAIN_GERMAN + r"und jeder Stoß auf ein Teil von \g<b> kg geht " + _PROBABLY_GERMAN

@@ -17,6 +17,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from impactcell.errors import PhysicsError
 from impactcell.numerics.jit import compiled
 from impactcell.physics.half_wave import Oscillator, Swing, separation_time, stop_time, swing_at, swing_from
 from impactcell.physics.linear_slide import (
@@ -30,6 +31,7 @@ from impactcell.physics.linear_slide import (
 )
 from impactcell.records import Samples
 
+MAX_SWINGS = 1_000_000  # half waves of one push: a part of 0.1 kg pushed 1.5 m at 5 mm/s has some 250 000
 MAX_RESTS = 4000  # of a part under one push, after which it is taken to creep without end
 CONVERGED_NEXT = 1e-8  # step, over the phase from halt to turn, after which Newton's method is at rounding
 SLOWEST_SWING = 1e-9  # of w², least squared frequency: a contact damped beyond that is taken as this
@@ -69,7 +71,7 @@ def contact_of(v: float, plant: Samples, part: Samples) -> Contact:
     w2 = k / mass
     z_on, z_off = 0.5 * (b + viscous) / mass, 0.5 * viscous / mass
     on = math.sqrt(max(w2 - z_on * z_on, SLOWEST_SWING * w2))
-    off = math.sqrt(w2 - z_off * z_off)
+    off = math.sqrt(max(w2 - z_off * z_off, SLOWEST_SWING * w2))
     rest = (kinetic + viscous * v) / k
     return Contact(v, k, kinetic, viscous, rest, Oscillator(z_on, w2, on), Oscillator(z_off, w2, off), part)
 
@@ -200,6 +202,11 @@ def displacements(v: float, strokes: Samples, plant: Samples, part: Samples, out
         instead of 0, 1, 2, ... such steps.
     out : ndarray, shape (n,)
         nan where contact is never lost and the stroke is infinite, or after `MAX_RESTS` rests.
+
+    Raises
+    ------
+    PhysicsError
+        Where one push takes more than `MAX_SWINGS` half waves, or has no end: no tap of a cell does.
     """
     contact, asked = contact_of(v, plant, part), Strokes(strokes, out)
     rest, mass = contact.static_indentation, part[0]
@@ -215,8 +222,14 @@ def displacements(v: float, strokes: Samples, plant: Samples, part: Samples, out
         if j == count:
             return
         t, e, r = moves_at, max(d, need) - rest, v
-        resting = False
+        resting, swings = False, 0
         while not resting:
+            swings += 1
+            if swings > MAX_SWINGS:
+                raise PhysicsError(
+                    "the part would swing on its actuator without end: velocity, stroke, mass or place of "
+                    "this tap are not those of a cell, in m/s, m, kg and m"
+                )
             duration, ending = half_wave(e, r, contact)
             if ending == FADES and count > j and math.isinf(strokes[count - 1]):
                 count -= 1

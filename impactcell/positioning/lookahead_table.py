@@ -17,6 +17,7 @@ from impactcell.positioning.displacement_quantiles import (
 )
 from impactcell.positioning.dynamic_programming import Goal, ValueFunction, solve_value_function
 from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior, anticipate_learning
+from impactcell.positioning.planner_questions import FURTHEST_M, is_number, is_positive
 from impactcell.positioning.quadrature import COARSE_Z, coarse_nodes
 from impactcell.positioning.safety_limits import allowed_strokes
 from impactcell.positioning.scatter_hypotheses import quantile_scales
@@ -51,6 +52,10 @@ SCATTER_Z = np.array([1.0, 3.0])
 """Nodes at which scatter is compared."""
 STALE_SCATTER = np.array([[4e-3, 4e-3, 0.02], [6e-3, 6e-3, 0.04]])
 """Change of the scatter at these nodes after which a table is made anew."""
+LIMITS = (
+    ("tolerance_m", False), ("max_velocity_m_s", False), ("max_stroke_m", True), ("max_force_n", True),
+)  # fmt: skip
+"""Names of the limits that must be positive, and whether a cell may do without: inf."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,13 +72,26 @@ class PlannerLimits:
 
     def __post_init__(self) -> None:
         """Refuse what no cell can have."""
-        for name in ("tolerance_m", "max_velocity_m_s", "max_stroke_m", "max_force_n"):
-            if not getattr(self, name) > 0.0:
-                raise PositioningError(f"tap planner: {name} must be positive, not {getattr(self, name)}")
-        if not 0.0 < self.overshoot_probability < 1.0:
+        for name, may_lack in LIMITS:
+            value = getattr(self, name)
+            if not (is_positive(value) or (may_lack and value == math.inf)):
+                raise PositioningError(f"tap planner: {name} must be positive, not {value}")
+        if FURTHEST_M < self.max_stroke_m < math.inf:
+            raise PositioningError(
+                f"tap planner: no stroke is {self.max_stroke_m:g} m long; max_stroke_m is in metres"
+            )
+        if not (is_number(self.overshoot_probability) and 0.0 < self.overshoot_probability < 1.0):
             raise PositioningError(
                 f"tap planner: overshoot_probability lies between 0 and 1, not {self.overshoot_probability}"
             )
+
+    @property
+    def commandable(self) -> tuple[float, float, float, Raster, Raster]:
+        """What says which taps there are, and so what a table of them hangs on."""
+        return (
+            self.max_velocity_m_s, self.max_stroke_m, self.max_force_n, self.velocity_raster,
+            self.stroke_raster,
+        )  # fmt: skip
 
     def penalty(self, caution: float) -> float:
         """Taps that an overshoot may cost."""

@@ -26,12 +26,14 @@ from impactcell.positioning.lookahead_table import (
 from impactcell.positioning.model_hypotheses import tap_predictions, with_model_accepted, with_score
 from impactcell.positioning.nominal_plant import nominal_plant
 from impactcell.positioning.planner_posterior import PlannerPosterior
+from impactcell.positioning.planner_questions import check_observation, check_question, lightest_kg
 from impactcell.positioning.posterior_update import update_posterior
 from impactcell.positioning.prediction_watch import score_of
 from impactcell.positioning.quadrature import Z
 from impactcell.positioning.safety_limits import PLANNED_SHARE, largest_force, room_m
 from impactcell.positioning.tap import Tap, Unreachable
 from impactcell.positioning.tap_model import model_of_tap
+from impactcell.positioning.without_tap import overshooting, too_light, unmoved
 from impactcell.records import Quality, Samples, Signature, TapPredictions
 
 MOST_STILL = 10
@@ -42,6 +44,9 @@ REMEMBERED = 64  # tables, of parts of different mass
 @dataclass(slots=True)
 class TapPlanner:
     """Chooses taps by the expected number still needed, and learns from each.
+
+    Tolerance, limits, rasters and travel may be changed between two taps, and hold from the next one on;
+    `plant` is where the planner starts from, and is asked no more.
 
     Parameters
     ----------
@@ -68,7 +73,7 @@ class TapPlanner:
     Raises
     ------
     PositioningError
-        For a limit, tolerance or probability that no cell can have, or a field that a plant does not have.
+        For a limit, tolerance or probability that no cell can have, or a plant that cannot be planned with.
     """
 
     tolerance_m: float = 10e-6
@@ -83,6 +88,7 @@ class TapPlanner:
     travel_m: tuple[float, float] = (-math.inf, math.inf)
     _posterior: PlannerPosterior = field(init=False, repr=False)
     _gravity: float = field(init=False, repr=False)
+    _lightest_kg: float = field(init=False, repr=False)
     _limits: PlannerLimits = field(init=False, repr=False)
     _profile: StrokeFriction | None = field(init=False, repr=False, default=None)
     _lookaheads: list[LookaheadTable] = field(init=False, repr=False, default_factory=list)
@@ -91,21 +97,16 @@ class TapPlanner:
 
     def __post_init__(self) -> None:
         """Refuse what no cell can have, and start from the nominal plant."""
-        self._limits = PlannerLimits(
-            self.tolerance_m, self.max_velocity_m_s, self.max_stroke_m, self.max_force_n,
-            self.overshoot_probability, self.velocity_raster, self.stroke_raster,
-        )  # fmt: skip
+        self._limits = self._stated_limits()
         plant = nominal_plant(self.plant)
+        viscous = max(free_motion.linear_resistance(plant), 0.0)
         self._gravity = plant.gravity_m_s2
+        self._lightest_kg = lightest_kg(plant.stiffness_n_per_m, plant.damping_n_s_per_m + viscous)
         if not self.travel_m[0] < self.travel_m[1]:
             raise PositioningError(f"tap planner: travel_m must be in order, not {self.travel_m}")
         compile_planning()
         self._posterior = model_hypotheses.prior(
-            plant.stiffness_n_per_m,
-            plant.damping_n_s_per_m,
-            plant.mu_s,
-            plant.mu_k,
-            max(free_motion.linear_resistance(plant), 0.0),
+            plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k, viscous
         )
 
     @property
@@ -114,7 +115,15 @@ class TapPlanner:
         return self._posterior
 
     def resume(self, posterior: PlannerPosterior) -> None:
-        """Go on from what had been learned earlier."""
+        """Go on from what had been learned earlier.
+
+        Raises
+        ------
+        PositioningError
+            For anything but a posterior.
+        """
+        if not isinstance(posterior, PlannerPosterior):
+            raise PositioningError(f"tap planner: resume takes what `posterior` gave, not {posterior!r}")
         self._posterior = posterior
 
     def accept_model(self) -> None:
@@ -137,7 +146,7 @@ class TapPlanner:
             Target minus position along +1; negative when the part lies beyond its target.
         mass_kg : float
         position_m : float
-            Where the part lies along +1; what the model lacks may depend on it.
+            Where the part lies along +1, m; what the model lacks may depend on it.
 
         Returns
         -------
@@ -146,12 +155,11 @@ class TapPlanner:
         Raises
         ------
         PositioningError
-            For a remaining distance or a mass that is not a number, or a mass that is not positive.
+            For a distance, mass or position that no part has, one in mm for instance, and for limits that
+            were changed to what no cell can have.
         """
-        if not math.isfinite(remaining_m):
-            raise PositioningError(f"remaining distance must be a number of metres, not {remaining_m}")
-        if not (math.isfinite(mass_kg) and mass_kg > 0.0):
-            raise PositioningError(f"mass of the part must be a positive number of kg, not {mass_kg}")
+        check_question(remaining_m, mass_kg, position_m, self.travel_m)
+        self._take_limits()
         if abs(remaining_m) <= self.tolerance_m:
             return None
         if remaining_m < 0.0 and not self.two_sided:
@@ -165,6 +173,8 @@ class TapPlanner:
                 f"{distance * 1e6:.1f} µm remain, {MOST_STILL} taps in a row have moved nothing, and any "
                 f"that moves more overshoots with a probability above {self.overshoot_probability:.2g}"
             )
+        if mass_kg < self._lightest_kg:
+            return too_light(mass_kg, self._lightest_kg)
         part = self._part(mass_kg)
         place = np.array([position_m, math.copysign(1.0, remaining_m)])
         room = room_m(self.travel_m, position_m, place[1])
@@ -181,10 +191,10 @@ class TapPlanner:
         Raises
         ------
         PositioningError
-            For a displacement or a mass that is not a number.
+            For what is no tap, as `Unreachable`, or one that no cell makes; for a displacement or a mass that
+            is not a number.
         """
-        if not (math.isfinite(moved_m) and math.isfinite(mass_kg) and mass_kg > 0.0):
-            raise PositioningError(f"cannot learn from a displacement of {moved_m} m of {mass_kg} kg")
+        check_observation(tap, moved_m, mass_kg)
         self._still = self._still + 1 if abs(moved_m) < LEAST_STEP_M else 0
         part = self._part(mass_kg)
         place = np.array([tap.position_m, float(tap.direction)])
@@ -233,10 +243,7 @@ class TapPlanner:
         """Choose a tap whose band ends within the room (m) that the travel leaves; inf: any tap."""
         lookahead = self._lookahead(part, place)
         if not lookahead.furthest_m > 0.0:
-            return Unreachable(
-                f"no tap up to {self.max_velocity_m_s} m/s and {self.max_stroke_m * 1e3} mm "
-                f"moves a part of {part[0]} kg at friction {self._posterior.mu_k:.3f}"
-            )
+            return unmoved(self._limits, self._posterior, part, place)
         space = self._limits.space(self._posterior, part, lookahead.strokes)
         scenarios = parameter_scenarios(self._posterior, Z, part, place)
 
@@ -252,18 +259,20 @@ class TapPlanner:
             distance - cut, lookahead, limits, space, scenarios, None if math.isinf(room) else stays
         )
         if action is None:
-            if room < math.inf:
-                return Unreachable(
-                    f"{distance * 1e6:.1f} µm remain, and every tap for a part of {part[0]:.3g} kg "
-                    f"overshoots or may pass the end of the travel, {room * 1e3:.3f} mm away; set a target "
-                    "further from it, or a wider tolerance"
-                )
-            return Unreachable(
-                f"{distance * 1e6:.1f} µm remain, and every tap for a part of {part[0]:.3g} kg overshoots "
-                f"{self.tolerance_m * 1e6:.3g} µm with a probability above {self.overshoot_probability:.2g} "
-                f"(the safest with {least:.2g})"
-            )
+            return overshooting(self._limits, distance, part, least, room)
         return tap_of(action, self._posterior, part, place)
+
+    def _stated_limits(self) -> PlannerLimits:
+        return PlannerLimits(
+            self.tolerance_m, self.max_velocity_m_s, self.max_stroke_m, self.max_force_n,
+            self.overshoot_probability, self.velocity_raster, self.stroke_raster,
+        )  # fmt: skip
+
+    def _take_limits(self) -> None:
+        """Plan within the limits as they are now; tables of taps within others are dropped."""
+        before, self._limits = self._limits, self._stated_limits()
+        if self._limits.commandable != before.commandable:
+            self._lookaheads = []
 
     def _is_stuck(self, remaining_m: float) -> bool:
         """Whether too many taps in a row have left the part where it lies; who asks again begins anew."""

@@ -21,12 +21,15 @@ SAID_BY = (
     "positioning/task_state_machine.py",
     "positioning/safety_limits.py",
     "positioning/planner.py",
+    "positioning/planner_questions.py",
+    "positioning/without_tap.py",
     "service/positioning.py",
     "fieldbus/tap_commands.py",
 )
 """Where a task can say why it ends, or is refused."""
 NO_TASK = re.compile(
-    r"tap planner: .*|remaining distance must .*|mass of the part must .*|cannot (learn from|use a) .*"
+    r"tap planner: .*|remaining distance must .*|(mass|position) of the part must .*|"
+    r"cannot (learn from|use a) .*"
 )
 """What the planner says to who calls it otherwise than a task does."""
 CELLS = {"cell", "name", "cell.name", "self._cell.name", "self._module.cell"}

@@ -1,0 +1,196 @@
+"""What a planner is given by mistake is refused by name, and limits changed on it are those it keeps."""
+
+import math
+import pickle
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from impactcell.errors import PhysicsError, PositioningError
+from impactcell.physics import Plant
+from impactcell.physics.closed_form import displacement_of
+from impactcell.positioning import Tap, TapPlanner, Unreachable
+
+HANG_S = 300
+"""Far longer than anything here takes; a loop in compiled code would hold the whole suite."""
+
+
+def in_a_process(code: str) -> str:
+    """What a process says that is ended from outside if it does not end by itself."""
+    imports = "import math\nfrom impactcell.errors import ImpactCellError\n"
+    imports += "from impactcell.positioning import Tap, TapPlanner\n"
+    body = (
+        f"try:\n    print({code})\nexcept ImpactCellError as error:\n    print(type(error).__name__, error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", imports + body], capture_output=True, text=True, timeout=HANG_S, check=True
+    )
+    return done.stdout
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        ("TapPlanner(max_velocity_m_s=math.inf).next_tap(.0123, 18.9)", "max_velocity_m_s must be positive"),
+        ("TapPlanner().next_tap(.01, 18.9, math.nan)", "position of the part must be a number of metres"),
+        ("TapPlanner().next_tap(.01, 18.9, 1e6)", "positions are in metres"),
+        ("TapPlanner().next_tap(.01, 1e-6)", "too light to plan for: below 0.0052 kg"),
+        ("TapPlanner().observe(Tap(-.03, .5e-3), .0015, 18.9)", "its velocity must be positive"),
+        ("TapPlanner().observe(Tap(0.0, 0.0), .0015, 18.9)", "its velocity must be positive"),
+    ],
+)
+def test_what_has_no_end_is_refused(code: str, told: str) -> None:
+    assert told in in_a_process(code)
+
+
+def test_a_push_without_end_is_no_endless_loop() -> None:
+    told = in_a_process(
+        "__import__('impactcell.physics.closed_form', fromlist=['_']).displacement_of(math.nan, *(__import__("
+        "'numpy').array(a) for a in ([1e-3], [[6.5e5, 465., .2, .15, 0.]], [1.], [18.9, 9.81])))"
+    )
+    assert told.startswith("PhysicsError the part would swing on its actuator without end")
+
+
+def test_the_longest_push_of_a_light_part_has_its_end() -> None:
+    """An undamped part of 0.1 kg that sticks no harder than it slides swings 1.5 m long at 5 mm/s."""
+    moved = displacement_of(
+        5e-3, np.array([1.5]), np.array([[6.5e5, 0.0, 0.2, 0.2, 0.0]]), np.ones(1), np.array([0.1, 9.81])
+    )
+    assert moved[0] == pytest.approx(1.5, rel=1e-3)
+    with pytest.raises(PhysicsError, match="without end"):
+        displacement_of(
+            5e-6, np.array([1.5]), np.array([[6.5e5, 0.0, 0.2, 0.2, 0.0]]), np.ones(1), np.array([0.1, 9.81])
+        )
+
+
+@pytest.mark.parametrize("position_m", [40.0, 300.0, 3000.0, math.inf, "0.04", None])
+def test_a_position_in_mm_or_that_is_none_is_refused(position_m: float) -> None:
+    with pytest.raises(PositioningError, match="metres"):
+        TapPlanner().next_tap(0.01, 18.9, position_m)
+
+
+def test_a_position_far_beyond_the_travel_is_refused_and_one_just_beyond_it_is_not() -> None:
+    planner = TapPlanner(tolerance_m=50e-6, travel_m=(0.0, 40e-3), two_sided=True)
+    with pytest.raises(PositioningError, match=r"cannot lie at 5 m, far beyond the travel of 0 to 0\.04 m"):
+        planner.next_tap(-5e-3, 18.9, 5.0)
+    assert isinstance(planner.next_tap(-5e-3, 18.9, 41e-3), Tap)
+
+
+@pytest.mark.parametrize("remaining_m", [1e308, -1e6, 12.3, "0.01", None])
+def test_a_distance_that_no_cell_has_is_refused(remaining_m: float) -> None:
+    with pytest.raises(PositioningError, match="metres"):
+        TapPlanner(two_sided=True).next_tap(remaining_m, 18.9)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"tolerance_m": math.inf}, {"tolerance_m": "20"}, {"max_velocity_m_s": math.nan},
+        {"max_stroke_m": 1.5e3}, {"max_stroke_m": None}, {"max_force_n": "60"},
+        {"overshoot_probability": "0.1"},
+    ],
+)  # fmt: skip
+def test_a_limit_that_no_cell_has_is_named(options: dict[str, float]) -> None:
+    with pytest.raises(PositioningError, match=f"tap planner: .*{next(iter(options))}"):
+        TapPlanner(**options)
+
+
+@pytest.mark.parametrize(
+    ("plant", "told"),
+    [
+        ({"mu_s": 0}, "plant: mu_s must be positive, not 0"),
+        ({"mu_k": 0}, "plant: mu_s must be positive, not 0"),
+        ({"mu_s": 0.2, "mu_k": 0.0}, "plant: mu_k must be positive, not 0.0"),
+        (Plant(6.5e5, 465.0, 0.2, 0.0), "plant: mu_k must be positive, not 0.0"),
+        ({"mu_s": "0.2"}, "plant: mu_s must be a number, not '0.2'"),
+        ({"stiffness_n_per_m": None}, "plant: stiffness_n_per_m must be a number, not None"),
+        ({"mu_s": 0.1, "mu_k": 0.3}, "plant: mu_k, 0.3, is above mu_s, 0.1"),
+        ("x", "plant is a Plant, or some of its fields by name, not 'x'"),
+        ([("mu_s", 0.2)], "plant is a Plant, or some of its fields by name"),
+        (0, "plant is a Plant, or some of its fields by name, not 0"),
+    ],
+)
+def test_a_plant_that_cannot_be_planned_with_is_told(plant: Plant | dict[str, float], told: str) -> None:
+    with pytest.raises(PositioningError, match=re.escape(told)):
+        TapPlanner(plant=plant)
+
+
+@pytest.mark.parametrize(
+    ("tap", "told"),
+    [
+        (None, "cannot learn from None: that is no tap"),
+        (Unreachable("too far"), "that is no tap"),
+        (Tap(math.inf, 1e-3), "velocity must be positive"),
+        (Tap(0.05, 0.0), "stroke must be positive"),
+        (Tap(0.05, -1e-3), "stroke must be positive"),
+        (Tap(0.05, 1e-3, 0), "must be 1 or -1"),
+        (Tap(0.05, 1e-3, position_m=40.0), "positions are in metres"),
+    ],
+)
+def test_nothing_is_learned_from_what_is_no_tap(tap: Tap, told: str) -> None:
+    planner = TapPlanner()
+    before = planner.posterior
+    with pytest.raises(PositioningError, match=told):
+        planner.observe(tap, 1e-3, 18.9)
+    assert planner.posterior is before
+
+
+def test_a_planner_resumes_from_a_posterior_alone() -> None:
+    planner = TapPlanner()
+    with pytest.raises(PositioningError, match="resume takes what `posterior` gave, not None"):
+        planner.resume(None)
+    planner.resume(pickle.loads(pickle.dumps(TapPlanner().posterior)))
+
+
+def test_limits_that_are_changed_are_planned_with() -> None:
+    """As a planner that was made with them: what it has worked out within others is not used."""
+    planner = TapPlanner(tolerance_m=20e-6)
+    assert isinstance(planner.next_tap(0.02, 18.9), Tap)
+    changed = {"max_velocity_m_s": 0.01, "max_stroke_m": 0.2e-3, "max_force_n": 120.0}
+    for name, value in changed.items():
+        setattr(planner, name, value)
+    tap = planner.next_tap(0.02, 18.9)
+    assert isinstance(tap, Tap)
+    assert tap == TapPlanner(tolerance_m=20e-6, **changed).next_tap(0.02, 18.9)
+    assert tap.velocity_m_s <= 0.01
+    assert tap.stroke_m <= 0.2e-3
+    assert planner.force(tap, 18.9) <= 120.0
+    planner.overshoot_probability = 1e-9
+    tap = planner.next_tap(0.02, 18.9)
+    assert not isinstance(tap, Tap) or tap.overshoot_probability <= 1e-9
+    planner.max_velocity_m_s = -1.0
+    with pytest.raises(PositioningError, match="max_velocity_m_s must be positive, not -1"):
+        planner.next_tap(0.02, 18.9)
+
+
+def test_tolerance_travel_and_side_are_changed_as_before() -> None:
+    planner = TapPlanner(tolerance_m=20e-6)
+    planner.tolerance_m = 1e-3
+    assert planner.next_tap(0.9e-3, 18.9) is None
+    assert isinstance(planner.next_tap(-2e-3, 18.9), Unreachable)
+    planner.two_sided = True
+    assert isinstance(planner.next_tap(-2e-3, 18.9, 10e-3), Tap)
+    planner.travel_m = (9e-3, 40e-3)
+    answer = planner.next_tap(-3e-3, 18.9, 10e-3)
+    assert answer == Unreachable("the target lies 2.000 mm beyond the travel")
+
+
+def test_the_force_that_a_part_takes_is_told_where_the_limit_forbids_it() -> None:
+    answer = TapPlanner(tolerance_m=20e-6, max_force_n=50.0).next_tap(0.02, 18.9)
+    assert isinstance(answer, Unreachable)
+    assert answer.reason.startswith(
+        "no tap within max_force_n, 50 N, moves a part of 18.9 kg at friction 0.190"
+    )
+    (needed,) = re.findall(r"the gentlest that does may take (\d+) N$", answer.reason)
+    assert 0.25 * 18.9 * 9.81 < int(needed) < 70  # what breaks it away, by the nominal plant; 70 N is enough
+    enough = TapPlanner(tolerance_m=20e-6, max_force_n=float(needed)).next_tap(0.02, 18.9)
+    assert not isinstance(enough, Unreachable) or "max_force_n" not in enough.reason
+
+
+def test_a_part_that_no_force_moves_within_velocity_and_stroke_is_not_blamed_on_the_limit_of_force() -> None:
+    answer = TapPlanner(max_velocity_m_s=0.01, max_stroke_m=0.05e-3, max_force_n=60.0).next_tap(5e-3, 60.0)
+    assert isinstance(answer, Unreachable)
+    assert answer.reason.startswith("no tap up to 0.01 m/s and 0.05 mm moves a part of 60.0 kg")
