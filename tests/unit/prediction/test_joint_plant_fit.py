@@ -1,11 +1,15 @@
 """The plant of a campaign: found from the simulator's taps, with and without a law that the model lacks."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.linalg import null_space
+from scipy.stats import multivariate_normal
 
 from impactcell.campaign import Excitation, from_contact
 from impactcell.campaign.recorded_campaign import from_captures
@@ -13,9 +17,9 @@ from impactcell.errors import PredictionError
 from impactcell.features import Features, extract, required
 from impactcell.features.contact import contact_spells
 from impactcell.physics import Plant
-from impactcell.prediction import Model, Prior, printed_predictor
+from impactcell.prediction import Model, Prior, estimate_from_features, printed_predictor
 from impactcell.prediction.joint_plant_fit import contact_constants, estimate_mass, fit_plant, ratio_scatter
-from impactcell.records import Capture, Channel
+from impactcell.records import Capture, Channel, Quality, Samples, as_recorded
 from tests.taps import Tap
 
 DRAG = {"quadratic_drag": {"drag_coefficient_n_s2_per_m2": 45.0}}
@@ -216,26 +220,91 @@ def test_bad_shots_are_left_out_and_a_campaign_of_them_is_refused() -> None:
         fit_plant([], 9.81)
 
 
-@pytest.mark.parametrize("error", [0.004, 0.01, 0.05])
-def test_scatter_of_the_ratio_is_what_its_errors_leave(error: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With equal errors the moment estimate is the sample variance less theirs (DerSimonian, Laird 1986)."""
-    ratios = [0.74, 0.77, 0.76, 0.78, 0.75, 0.79, 0.76]
+@pytest.mark.parametrize("error", [0.004, 0.01, 0.03, 0.05])
+def test_scatter_of_the_ratio_is_what_its_errors_do_not_exclude(
+    error: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The root of its expected square, by quadrature over the density of contrasts, which hold no mean."""
+    ratios = np.array([0.74, 0.77, 0.76, 0.78, 0.75, 0.79, 0.76])
+    errors = error * np.array([1.0, 0.8, 1.2, 1.0, 1.1, 0.9, 1.0])
     shown = [
-        SimpleNamespace(mu_s=0.2, mu_k=0.2 * ratio, mu_s_std=0.2 * error / ratio, immediate=0.0)
-        for ratio in ratios
+        SimpleNamespace(
+            mu_s=0.2,
+            mu_k=0.2 * ratio,
+            mu_s_std=0.2 * math.hypot(own, 0.002) / ratio,
+            mu_s_common_std=0.2 * 0.002 / ratio,
+            immediate=0.0,
+        )
+        for ratio, own in zip(ratios, errors, strict=True)
     ]
-    hidden = SimpleNamespace(mu_s=0.2, mu_k=0.02, mu_s_std=0.001, immediate=0.5)
-    vague = SimpleNamespace(mu_s=0.2, mu_k=0.02, mu_s_std=0.012, immediate=0.0)
+    hidden = SimpleNamespace(mu_s=0.2, mu_k=0.02, mu_s_std=0.001, mu_s_common_std=0.0, immediate=0.5)
+    vague = SimpleNamespace(mu_s=0.2, mu_k=0.02, mu_s_std=0.012, mu_s_common_std=0.0, immediate=0.0)
 
     def scatter(fits: list[SimpleNamespace]) -> float:
         monkeypatch.setattr("impactcell.prediction.joint_plant_fit.fit", lambda tap, _: fits[tap])
         return ratio_scatter(range(len(fits)), fit_model)  # type: ignore[arg-type]
 
     fit_model = printed_model()
-    between = np.var(ratios, ddof=1) - error**2
-    expected = math.sqrt(max(between, 0.0))
-    assert scatter([hidden, *shown, vague]) == pytest.approx(expected if error < 0.03 else 0.0, rel=1e-9)
+    contrasts = null_space(np.ones((1, len(ratios)))).T
+    prior_std = 0.03 * ratios.mean()
+
+    def density(std: float) -> float:
+        covariance = contrasts @ np.diag(errors**2 + std**2) @ contrasts.T
+        seen = multivariate_normal.logpdf(contrasts @ ratios, np.zeros(len(contrasts)), covariance)
+        return math.exp(float(seen) - 15.0 - 0.5 * (std / prior_std) ** 2)
+
+    square, whole = (
+        quad(lambda std, power=power: std**power * density(std), 0.0, 5.0 * prior_std, epsabs=0.0)[0]
+        for power in (2, 0)
+    )
+    expected = math.sqrt(square / whole) if error < 0.04 else 0.0
+    assert scatter([hidden, *shown, vague]) == pytest.approx(expected, rel=1e-3)
     assert scatter([*shown[:4], hidden]) == 0.0, "too few"
+
+
+@pytest.mark.parametrize("ratio_std", [0.0, 0.01, 0.03])
+def test_mu_s_is_within_what_a_model_of_the_same_taps_says(ratio_std: float) -> None:
+    """Slow taps, whose ratio scatters: where that was told as one number half of mu_s lay outside of 95 %."""
+    pulls = []
+    for seed in range(2):
+        draw = np.random.default_rng([seed, 77])
+        taps = [
+            Tap(
+                float(draw.uniform(1500.0, 3000.0)) / 6e4,
+                0.2 * math.exp(0.02 * draw.standard_normal()),
+                ratio=0.76 * math.exp(ratio_std * draw.standard_normal()),
+                stroke_m=1.5e-3,
+                effects={},
+            )
+            for _ in range(40)
+        ]
+        features = [extract(as_recorded(begun_within_a_step(tap, draw))) for tap in taps]
+        model = fit_plant(features, 9.81).model
+        for tap, seen in zip(taps, features, strict=True):
+            mu_s = estimate_from_features(seen, model).mu_s
+            if mu_s.quality is Quality.GOOD:
+                pulls.append((mu_s.value - tap.mu_s) / mu_s.std)
+    assert len(pulls) > 70
+    assert float(np.mean(np.abs(pulls) < 1.96)) > 0.85
+
+
+def begun_within_a_step(tap: Tap, draw: np.random.Generator) -> Capture:
+    """Give a tap whose first contact lies anywhere in the sampling step before the first sample."""
+    whole, moved, late_s = tap.capture(draw), tap.motion(), 1e-4 * draw.uniform()
+
+    def counted(channel: Channel | None, values: Callable[[Samples], Samples]) -> Channel:
+        assert channel is not None
+        assert channel.noise_std is not None
+        times = np.arange(1, len(channel.time_s) + 1) * 1e-4
+        times = times[times > late_s]
+        noise = draw.normal(0.0, channel.noise_std, len(times))
+        return replace(channel, time_s=times, values=values(times - late_s) + noise)
+
+    return replace(
+        whole,
+        force=counted(whole.force, moved.force_n),
+        position=counted(whole.position, moved.position_m),
+    )
 
 
 def taps_of(cell: Tap, seed: int, mu_s_scatter: float, ratio_scatter: float) -> list[Features]:
