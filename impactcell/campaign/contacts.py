@@ -41,16 +41,16 @@ class Baseline:
     threshold: float
 
 
-def pulse_sign(force: Samples) -> int:
-    """Sign of the contact force: that of the larger excursion from the median."""
-    middle = float(np.median(force))
-    low, high = extremes(force)
+def pulse_sign(values: Samples, rest: float | None = None) -> int:
+    """Sign of a contact force, or of a motion: that of the larger excursion from rest, else the median."""
+    middle = float(np.median(values)) if rest is None else rest
+    low, high = extremes(values)
     return 1 if high - middle >= middle - low else -1
 
 
-def extremes(force: Samples) -> tuple[float, float]:
-    """Smallest and largest force that lasts for as many samples as a contact: a spike is neither."""
-    lasting = median_filter(force, 2 * CONFIRMING_SAMPLES - 1, mode="nearest")
+def extremes(values: Samples) -> tuple[float, float]:
+    """Smallest and largest value that lasts for as many samples as a contact: a spike is neither."""
+    lasting = median_filter(values, 2 * CONFIRMING_SAMPLES - 1, mode="nearest")
     return float(lasting.min()), float(lasting.max())
 
 

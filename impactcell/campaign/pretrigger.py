@@ -7,7 +7,7 @@ import numpy as np
 
 from impactcell.campaign import contacts
 from impactcell.campaign.contents import Campaign, Excitation
-from impactcell.numerics.raster import raster_of
+from impactcell.numerics.raster import step_of
 from impactcell.numerics.rest_level import FEWEST, rest_level
 from impactcell.numerics.spikes import noise_of
 from impactcell.records import Capture, Channel, since_contact, with_open_onset
@@ -142,6 +142,6 @@ def _from_rest(shot: Capture) -> Channel | None:
     if len(before) < FEWEST:
         return position
     noise_std = position.noise_std or noise_of(before)
-    level, zero_std = rest_level(before, noise_std, position.resolution or raster_of(position.values) or 0.0)
+    level, zero_std = rest_level(before, noise_std, step_of(position.values, position.resolution))
     place = shot.start_m if abs(level - shot.start_m) < abs(level) else 0.0
     return replace(position, values=position.values - (level - place), zero_std=zero_std)

@@ -8,7 +8,7 @@ import numpy as np
 from impactcell.errors import CaptureError, NoBreakawayError
 from impactcell.features.noise import noise_std
 from impactcell.numerics.local_polynomial import channel_statistics, mean, running_mean
-from impactcell.numerics.raster import raster_of
+from impactcell.numerics.raster import step_of
 from impactcell.numerics.rest_level import FEWEST, rest_level
 from impactcell.records import Capture, Channel, Samples, since_contact
 
@@ -125,7 +125,9 @@ def _from_rest(position: CheckedChannel, capture: Capture) -> CheckedChannel:
         return position
     before = int(np.searchsorted(position.time_s, 0.0, "right"))
     if before >= FEWEST:
-        level, zero_std = rest_level(position.values[:before], position.sigma, step_of(position))
+        level, zero_std = rest_level(
+            position.values[:before], position.sigma, step_of(position.values, position.resolution)
+        )
         return _counted_from(position, level, zero_std)
     count = int(np.searchsorted(position.time_s[:FEWEST], HARDLY_MOVED_S, "right"))
     resting = position.values[: max(count, 1)]
@@ -142,11 +144,6 @@ def _from_rest(position: CheckedChannel, capture: Capture) -> CheckedChannel:
 def _counted_from(position: CheckedChannel, level: float, zero_std: float) -> CheckedChannel:
     values = position.values - level
     return replace(position, values=values, highest=position.highest - level, zero_std=zero_std)
-
-
-def step_of(channel: Channel) -> float:
-    """Give the step of the raster on which a channel's values lie; 0 where on none that shows."""
-    return channel.resolution or raster_of(channel.values) or 0.0
 
 
 def smoothing_width(channel: Channel) -> int:

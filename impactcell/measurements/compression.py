@@ -84,14 +84,8 @@ def _contacts(record: Record, given: Given) -> list[_Contact]:
     for onset in contacts.contact_onsets(time, size, contacts.baseline_of(size, threshold)):
         begin_s = float(time[onset])
         push = force[(time >= begin_s) & (time < begin_s + contacts.SHOT_GAP_S)]
-        found.append(_Contact(begin_s, _side(push, middle), _motion(record, given, begin_s)))
+        found.append(_Contact(begin_s, contacts.pulse_sign(push, middle), _motion(record, given, begin_s)))
     return found
-
-
-def _side(values: Samples, rest: float) -> int:
-    """Give +1 or -1: the side of where it rests to which a channel goes farther."""
-    low, high = contacts.extremes(values)
-    return 1 if high - rest >= rest - low else -1
 
 
 def _motion(record: Record, given: Given, begin_s: float) -> int:
@@ -110,7 +104,7 @@ def _motion(record: Record, given: Given, begin_s: float) -> int:
     low, high = contacts.extremes(after)
     if max(high - rest, rest - low) <= MOVED_STD * noise_of(position):
         return 0
-    return _side(after, rest)
+    return contacts.pulse_sign(after, rest)
 
 
 def _by_contact(record: Record, found: Sequence[_Contact]) -> Record:

@@ -66,3 +66,8 @@ def raster_of(values: NDArray[np.float64]) -> float | None:
     step = float(small.sum() / np.rint(small / step).sum())
     counts = steps / step
     return step if float(np.abs(counts - np.rint(counts)).max()) < MAX_OFF else None
+
+
+def step_of(values: NDArray[np.float64], stated: float | None) -> float:
+    """Give the step of the raster on which values lie, as it is stated or shows in them; 0 where on none."""
+    return stated or raster_of(values) or 0.0

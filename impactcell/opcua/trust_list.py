@@ -27,7 +27,7 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import rsa
 
 from impactcell.errors import AccessError
-from impactcell.opcua.certificate_dates import CertificateWatch
+from impactcell.opcua.certificate_dates import CertificateWatch, validity_mark
 from impactcell.opcua.certificate_files import (
     UNREADABLE,
     der,
@@ -118,8 +118,7 @@ class TrustList:
     @staticmethod
     def is_valid_now(certificate: x509.Certificate) -> bool:
         """Whether the present lies between the two dates of a certificate."""
-        now = dt.datetime.now(dt.UTC)
-        return certificate.not_valid_before_utc <= now <= certificate.not_valid_after_utc
+        return not validity_mark(certificate, dt.datetime.now(dt.UTC))
 
     def check(self, data: bytes) -> None:
         """Check a client's certificate, the first where a chain is sent; keep it in `rejected` if it fails.
