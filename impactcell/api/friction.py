@@ -12,13 +12,21 @@ from numpy.typing import ArrayLike
 
 from impactcell.campaign.pretrigger import is_late, late_onset
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError, PredictionError
-from impactcell.features import Features, extract, noise_std
+from impactcell.features import Features, extract, impulse_balance, noise_std
 from impactcell.physics import TapInput
 from impactcell.prediction import Model, calibrate, estimate_from_features
 from impactcell.prediction.joint_plant_fit import estimate_mass, fit_plant
 from impactcell.process.console import print_note
 from impactcell.process.progress import progress
-from impactcell.records import MM_PER_MIN, Capture, Channel, FrictionEstimate, Samples, as_recorded
+from impactcell.records import (
+    MM_PER_MIN,
+    Capture,
+    Channel,
+    FrictionEstimate,
+    Samples,
+    as_recorded,
+    sampling_step_s,
+)
 
 FRICTIONS = 9
 """Values of mu_s that are swept for each mass of a campaign: three times the coefficients of (4) and (5)."""
@@ -99,7 +107,6 @@ def estimate(
         )
     _check_velocity(velocity_m_s, is_needed=model is None)
     _check_mass(mass_kg, is_needed=model is None)
-    _check_signs_and_start(time, force, position)
     capture = Capture(
         cycle=1,
         velocity_m_s=velocity_m_s,
@@ -109,6 +116,7 @@ def estimate(
         stroke_m=stroke_m,
     )
     features = extract(as_recorded(capture))
+    _check_signs_and_start(features)
     if model is not None:
         from impactcell.settings.model_file import read_model
 
@@ -140,27 +148,23 @@ def _check_mass(mass_kg: float, *, is_needed: bool) -> None:
         raise CaptureError(f"mass_kg = {mass_kg:g}: give the mass of the part in kg, above 0")
 
 
-def _check_signs_and_start(time_s: Samples, force_n: Samples, position_m: Samples) -> None:
+def _check_signs_and_start(features: Features) -> None:
     """Refuse traces of the other sign, and of another t = 0, with what would mend them."""
-    if not (len(time_s) and np.isfinite(force_n).all() and np.isfinite(position_m).all()):
-        return  # what is wrong with the samples is told by the features
-    if -float(force_n.min()) > float(force_n.max()):
+    if pull := impulse_balance.pull_n(features):
+        raise CaptureError(f"force_n pulls with {pull:.4g} N, where a contact only pushes: give -force_n")
+    if back_m := impulse_balance.moved_back_m(features):
         raise CaptureError(
-            f"force_n pulls with {-force_n.min():.4g} N, where a contact only pushes: give -force_n"
+            f"position_m falls by {1e3 * back_m:.4g} mm, and is positive along the tap: give -position_m"
         )
-    end = max(len(time_s) // 50, 1)
-    way_m = float(np.median(position_m[-end:]) - np.median(position_m[:end]))
-    lowest, highest = float(position_m.min() - position_m[0]), float(position_m.max() - position_m[0])
-    if way_m < 0.0 and -lowest > 10.0 * abs(highest):
+    force, step_s = features.capture.force, sampling_step_s(features.capture)
+    onset = late_onset(force)
+    if force is None or onset is None:
+        return
+    begin_s = float(force.time_s[onset])
+    if is_late(begin_s, step_s, is_stated=bool(force.time_s[0] < 0.0)):
         raise CaptureError(
-            f"position_m falls by {-1e3 * way_m:.4g} mm, and is positive along the tap: give -position_m"
-        )
-    onset = late_onset(Channel(time_s, force_n))
-    step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 0.0
-    if onset is not None and is_late(float(time_s[onset]), step_s, is_stated=bool(time_s[0] < 0.0)):
-        raise CaptureError(
-            f"the force begins at {1e3 * time_s[onset]:.4g} ms, and t = 0 is first contact: give "
-            f"time_s - {time_s[onset] - step_s:.6g}, or look for a step of the force before"
+            f"the force begins at {1e3 * begin_s:.4g} ms, and t = 0 is first contact: give "
+            f"time_s - {begin_s - step_s:.6g}, or look for a step of the force before"
         )
 
 

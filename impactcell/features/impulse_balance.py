@@ -29,29 +29,42 @@ def doubts(features: Features) -> tuple[str, ...]:
     return tuple(text for text in found if text)
 
 
-def _sign_of_force(features: Features) -> str:
+def pull_n(features: Features) -> float:
+    """Give with how much a force pulls, where a contact only pushes; 0 where it pushes, or cannot be told."""
     force = features.force
     if isinstance(force, Exception):
-        return ""
+        return 0.0
     least, most = float(force.smooth.min()), float(force.smooth.max())
-    if -least < MIN_CONTACT_STD * force.sigma or -least < 2.0 * most:
+    return 0.0 if -least < MIN_CONTACT_STD * force.sigma or -least < 2.0 * most else -least
+
+
+def moved_back_m(features: Features) -> float:
+    """Give how far the part moved against its tap; 0 where it did not, or cannot be told."""
+    position = features.position
+    if isinstance(position, Exception):
+        return 0.0
+    few = rest_samples(len(position.values))
+    way = float(np.mean(position.values[-few:]) - np.mean(position.values[:few]))
+    moved = features.capture.direction * way
+    return 0.0 if moved > -MIN_MOTION_STD * position.sigma else -moved
+
+
+def _sign_of_force(features: Features) -> str:
+    pull = pull_n(features)
+    if not pull:
         return ""
     return (
-        f"force pulls with {-least:.4g} N, where a contact only pushes: turn its sign in the module or at "
+        f"force pulls with {pull:.4g} N, where a contact only pushes: turn its sign in the module or at "
         "its amplifier"
     )
 
 
 def _sign_of_position(features: Features) -> str:
-    position, direction = features.position, features.capture.direction
-    if isinstance(position, Exception):
-        return ""
-    few = rest_samples(len(position.values))
-    moved = direction * float(np.mean(position.values[-few:]) - np.mean(position.values[:few]))
-    if moved > -MIN_MOTION_STD * position.sigma:
+    back_m, direction = moved_back_m(features), features.capture.direction
+    if not back_m:
         return ""
     return (
-        f"the part moved {-1e3 * moved:.4g} mm against the tap's direction {direction:+d}: turn the sign of "
+        f"the part moved {1e3 * back_m:.4g} mm against the tap's direction {direction:+d}: turn the sign of "
         "position in the module, or put direction right"
     )
 
