@@ -31,6 +31,8 @@ from impactcell.fieldbus.positioning_registers import (
 )
 from impactcell.fieldbus.status_block import PositioningStatus, integer
 
+Objection = Callable[[PositioningStatus], str]
+"""Says why a tap is no longer to be made, from what the module shows; nothing where it is."""
 _POLL_S: Final = 0.005
 """Between two looks at the outcome of a tap, seconds: a tenth of the shortest tap and slide."""
 _ROUNDING: Final = 1e-6
@@ -51,6 +53,14 @@ class TapCommand:
     def parameters(self) -> dict[str, float]:
         """What is written to which register, SI."""
         return dict(zip(PARAMETERS, (self.velocity_m_s, self.stroke_m, self.direction), strict=True))
+
+
+class NotCommandedError(PositioningError):
+    """A tap that somebody objected to at the last moment; `report` is what the module showed then."""
+
+    def __init__(self, message: str, report: PositioningStatus) -> None:
+        super().__init__(message)
+        self.report = report
 
 
 class TapCommander:
@@ -74,17 +84,20 @@ class TapCommander:
         """Whether the module's map has the registers of a positioning cell."""
         return all(name in self._module.registers for name in (*COMMAND, "command_result"))
 
-    async def tap(self, command: TapCommand, is_wanted: Callable[[], bool] = lambda: True) -> int:
-        """Execute one tap; return the number of the cycle that it made.
+    async def tap(self, command: TapCommand, objection: Objection = lambda _: "") -> PositioningStatus:
+        """Execute one tap; return what the module showed as it was done.
 
         Parameters
         ----------
-        is_wanted : callable
-            Asked at the last moment before the module is told to strike: where it says no, nothing is
-            commanded any more, however long the link was down.
+        objection : callable
+            Asked, with what the module shows, before anything is written and at the last moment before the
+            module is told to strike: where it gives a reason, nothing is commanded any more, however long the
+            link was down.
 
         Raises
         ------
+        NotCommandedError
+            If there was an objection.
         PositioningError
             If the command is refused, aborted or not finished in time; the message says whether the part may
             have been struck.
@@ -95,6 +108,7 @@ class TapCommander:
             try:
                 async with asyncio.timeout(self._patience_s):
                     session, before = await self._read_positioning()
+                    self._ask(objection, before)
                     if before.state != READY:
                         raise PositioningError(
                             f"{self._module.cell}: module takes no command, it is {before.state}"
@@ -102,7 +116,7 @@ class TapCommander:
                     number = await self._next_sequence(before.accepted_command)
                     await self._write_parameters(command)
                     sequence = number
-                    return await self._execute(session, sequence, before.accepted_command, is_wanted)
+                    return await self._execute(session, sequence, before.accepted_command, objection)
             except TimeoutError:
                 cell, shown = self._module.cell, self._accepted_now
                 if sequence and shown not in (None, sequence):
@@ -115,41 +129,30 @@ class TapCommander:
                     f"{cell}: tap not finished within {self._patience_s:g} s; {struck}"
                 ) from None
 
-    async def read_report(self) -> PositioningStatus:
-        """Return what the module says now, waiting for the link where it is down.
-
-        Raises
-        ------
-        PositioningError
-            If it could not be read in time.
-        """
-        try:
-            async with asyncio.timeout(self._patience_s):
-                return (await self._read_positioning())[1]
-        except TimeoutError:
-            raise PositioningError(
-                f"{self._module.cell}: the module has not been read for {self._patience_s:g} s"
-            ) from None
-
     async def read_report_at_rest(self) -> PositioningStatus:
-        """Return what the module says once it is ready for a tap, the part at rest.
+        """Return what the module says once it is ready for a tap, waiting for that and for the link.
 
         Raises
         ------
         PositioningError
             It was not in time.
         """
+        cell, report = self._module.cell, None
         try:
             async with asyncio.timeout(self._patience_s):
                 while True:
-                    report = await self.read_report()
+                    _, report = await self._read_positioning()
                     if report.state == READY:
                         return report
                     await asyncio.sleep(_POLL_S)
         except TimeoutError:
-            raise PositioningError(
-                f"{self._module.cell}: the module has not been ready for {self._patience_s:g} s"
-            ) from None
+            if report is None:
+                why = f"{cell}: the module has not been read for {self._patience_s:g} s"
+            else:
+                why = (
+                    f"{cell}: the module has not been ready for {self._patience_s:g} s, it is {report.state}"
+                )
+            raise PositioningError(why) from None
 
     async def abort(self) -> None:
         """Abort what is being executed.
@@ -179,6 +182,10 @@ class TapCommander:
                     f"{cell}: register {name} ({register.address}) cannot express {value:g}, it would show "
                     f"{shown:g}; nothing has been commanded"
                 )
+
+    def _ask(self, objection: Objection, report: PositioningStatus) -> None:
+        if why := objection(report):
+            raise NotCommandedError(f"{self._module.cell}: {why}; nothing has been commanded", report)
 
     async def _read_positioning(self) -> tuple[int, PositioningStatus]:
         """Return session and a fresh report, waiting for the link if it is down."""
@@ -246,8 +253,8 @@ class TapCommander:
             return sequence if sequence != accepted else sequence % last + 1
 
     async def _execute(
-        self, session: int, sequence: int, accepted: int, is_wanted: Callable[[], bool]
-    ) -> int:
+        self, session: int, sequence: int, accepted: int, objection: Objection
+    ) -> PositioningStatus:
         """Write the sequence number until the module has it, and wait for the outcome.
 
         Where it takes another one than `accepted` meanwhile, that of an earlier command, nothing is written.
@@ -260,7 +267,7 @@ class TapCommander:
                 raise PositioningError(f"{cell}: module was started anew during tap {sequence}")
             if positioning.accepted_command == sequence:
                 if positioning.result == DONE:
-                    return positioning.cycle
+                    return positioning
                 if positioning.result != EXECUTING:
                     raise PositioningError(f"{cell}: tap {sequence}: {positioning.result}")
             elif not written:
@@ -270,8 +277,7 @@ class TapCommander:
                         f"{accepted} to {positioning.accepted_command} before command {sequence} was "
                         "written: the module has taken an earlier one; the part may have been struck"
                     )
-                if not is_wanted():
-                    raise PositioningError(f"{cell}: aborted; nothing has been commanded")
+                self._ask(objection, positioning)
                 try:
                     await self._module.register_client.write_values({"command_sequence": sequence})
                     written = True

@@ -90,7 +90,8 @@ GERMAN: Final = {
         r"Register \1 (\2) zeigt nicht, was geschrieben wurde" + _NOT_COMMANDED_GERMAN,
     r"register (\S+) \((\d+)\) cannot express (?P<a>\S+), it would show (?P<b>\S+)" + NOT_COMMANDED:
         r"Register \1 (\2) kann \g<a> nicht ausdrücken, es zeigte \g<b>" + _NOT_COMMANDED_GERMAN,
-    r"aborted" + NOT_COMMANDED: "abgebrochen" + _NOT_COMMANDED_GERMAN,
+    r"the part has moved (\d+) times before tap (\d+) was made":
+        r"das Teil hat sich \1-mal bewegt, bevor Stoß \2 ausgeführt war",
     r"tap not finished within (\S+) s" + NOT_COMMANDED:
         r"der Stoß war nach \1 s nicht beendet" + _NOT_COMMANDED_GERMAN,
     r"tap not finished within (\S+) s; the part may have been struck":
@@ -106,7 +107,8 @@ GERMAN: Final = {
     r"module was started anew during tap (\d+)": r"das Modul wurde während Stoß \1 neu gestartet",
     r"tap (\d+): (.+)": r"Stoß \1: \2",
     r"the module has not been read for (\S+) s": r"das Modul ließ sich \1 s lang nicht lesen",
-    r"the module has not been ready for (\S+) s": r"das Modul war \1 s lang nicht bereit",
+    r"the module has not been ready for (\S+) s, it is (.+)":
+        r"das Modul war \1 s lang nicht bereit, es ist \2",
     r"the module reported no position after tap (\d+)": r"das Modul meldet nach Stoß \1 keine Position",
     r"no further tap is commanded, but the module could not be told: (?P<link>.+)":
         r"kein weiterer Stoß wird befohlen, doch dem Modul ließ es sich nicht sagen: \g<link>",

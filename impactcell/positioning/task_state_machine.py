@@ -24,6 +24,7 @@ from impactcell.records import LARGEST_STATISTIC, Evidence, PositioningState
 
 BAND_SIGMAS = 3.29  # the band of a displacement holds 99.9 %
 MOST_TAPS = 200  # of one task; a task that needs more is not converging
+MOST_REPLANS = 20  # in a row; by chance 1 in 100 000 where readings scatter by a third of the tolerance
 
 
 class TaskPhase(enum.Enum):
@@ -81,6 +82,8 @@ class TaskState:
         To be commanded (COMMANDING), or commanded and not yet observed (WAITING).
     taps : int
         Commanded in this task.
+    replans : int
+        In a row, of a tap before which the part has moved.
     reason : str
         Why it is IDLE, SETTLED or FAULTED.
     evidence : Evidence or None
@@ -93,6 +96,7 @@ class TaskState:
     mass_kg: float = math.nan
     tap: Tap | None = None
     taps: int = 0
+    replans: int = 0
     reason: str = ""
     evidence: Evidence | None = None
     start_m: float = math.nan
@@ -202,6 +206,19 @@ def commanded(sequence: TaskState) -> TaskState:
     return replace(sequence, phase=TaskPhase.WAITING, taps=sequence.taps + 1)
 
 
+def replan(sequence: TaskState, cell: PositioningCell, planner: TapPlanner, position_m: float) -> TaskState:
+    """Plan the tap that has not been commanded anew: the part lies at `position_m` by now."""
+    if sequence.phase is not TaskPhase.WAITING:
+        return sequence
+    number, times = sequence.taps, sequence.replans + 1
+    lies = replace(sequence, position_m=position_m, tap=None, taps=number - 1, replans=times)
+    if not math.isfinite(position_m):
+        return failed(lies, f"{cell.name}: the position of the part is not known")
+    if times > MOST_REPLANS:
+        return failed(lies, f"{cell.name}: the part has moved {times} times before tap {number} was made")
+    return _plan(lies, cell, planner)
+
+
 def observed(sequence: TaskState, cell: PositioningCell, planner: TapPlanner, position_m: float) -> TaskState:
     """Go on after the tap has moved the part to `position_m`: next tap, SETTLED, or FAULTED with evidence."""
     tap = sequence.tap
@@ -211,7 +228,7 @@ def observed(sequence: TaskState, cell: PositioningCell, planner: TapPlanner, po
         return failed(sequence, f"{cell.name}: the module reported no position after tap {sequence.taps}")
     moved = (position_m - sequence.position_m) * tap.direction
     planner.observe(tap, moved, sequence.mass_kg)
-    lies = replace(sequence, position_m=position_m, tap=None)
+    lies = replace(sequence, position_m=position_m, tap=None, replans=0)
     half = 0.5 * (tap.highest_m - tap.lowest_m)
     missed = abs(moved - tap.expected_m) / half * BAND_SIGMAS if half > 0.0 else math.inf
     evidence = Evidence(

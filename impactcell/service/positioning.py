@@ -7,18 +7,19 @@ import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from impactcell.cell import CellDesign
 from impactcell.errors import FieldbusError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
+from impactcell.fieldbus.positioning_registers import READY
 from impactcell.fieldbus.status_block import PositioningStatus
-from impactcell.fieldbus.tap_commands import TapCommand, TapCommander
+from impactcell.fieldbus.tap_commands import NotCommandedError, TapCommand, TapCommander
 from impactcell.positioning import PlannerPosterior, task_state_machine
 from impactcell.positioning.task_state_machine import TaskOutcome, TaskPhase, TaskState
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import Evidence, PositioningState, Snapshot
-from impactcell.service.factory import positioning_cell, tap_planner
-from impactcell.service.known_friction import is_friction_known, kinetic_friction
+from impactcell.service.cell_planner import CellPlanner
 from impactcell.service.plc_targets import PlcTargets
 from impactcell.service.worker import CellWorker
 from impactcell.settings import CellConfig
@@ -55,11 +56,10 @@ class PositioningTask:
         changed: Callable[[], None],
     ) -> None:
         self._log = CellLogger(logging.getLogger(__name__), cell.name)
-        self._cell = positioning_cell(cell)
-        self._planner = tap_planner(cell, self._cell, design, module.registers)
+        self._cell = cell.name
+        self._planner = CellPlanner(cell, design, module.registers, worker.snapshot)
         if worker.belief is not None:
-            self._planner.resume(worker.belief)
-        self._design = design
+            self._planner.taps.resume(worker.belief)
         self._module = module
         self._positioner = TapCommander(module)
         self._worker = worker
@@ -68,13 +68,12 @@ class PositioningTask:
         self.outcomes: deque[TaskOutcome] = deque(maxlen=REMEMBERED)
         """Of the last tasks, in their order."""
         self._wake = asyncio.Event()
-        self._predictions = self._planner.predictions
+        self._predictions = self._planner.taps.predictions
         self._plc_targets = PlcTargets()
         self._begun_target: tuple[int, int] | None = None  # session and sequence of the one whose task runs
         self._at_rest = asyncio.Event()  # no tap is under way, also none that was aborted
         self._at_rest.set()
         self._left_at_m = math.nan  # where the tap under way when its task was stopped has left the part
-        self._batch_shift_cycle = worker.snapshot.batch.last_shift_cycle if worker.snapshot else 0
 
     @property
     def state(self) -> PositioningState:
@@ -94,7 +93,7 @@ class PositioningTask:
     @property
     def belief(self) -> PlannerPosterior:
         """What the planner has learned."""
-        return self._planner.posterior
+        return self._planner.taps.posterior
 
     async def begin(self, target_m: float) -> None:
         """Start a task.
@@ -105,26 +104,12 @@ class PositioningTask:
             The target is refused; nothing has been commanded.
         """
         before = self._sequence
-        report = self._report()
-        if not self._at_rest.is_set() and not before.running:  # one that was aborted still moves the part
-            await self._at_rest.wait()
-            report = await self._positioner.read_report_at_rest()
-        mass_kg = report.mass_kg
-        if math.isnan(mass_kg) and self._design.defaults.mass_kg is not None:
-            mass_kg = self._design.defaults.mass_kg
+        report = await self._report_at_rest()
         started = await self._worker.run(
-            lambda: task_state_machine.begin_task(
-                before,
-                self._cell,
-                self._planner,
-                target_m=target_m,
-                position_m=report.position_m,
-                mass_kg=mass_kg,
-                trained=is_friction_known(self._worker.snapshot, self._design),
-            )
+            lambda: self._planner.begin(before, target_m, report, self._worker.snapshot)
         )
         if self._sequence is not before:
-            raise PositioningError(f"{self._cell.name}: aborted, or another task was started, meanwhile")
+            raise PositioningError(f"{self._cell}: aborted, or another task was started, meanwhile")
         self._set_sequence(started)
         self._wake.set()
 
@@ -144,48 +129,27 @@ class PositioningTask:
             await self._positioner.abort()
         except FieldbusError as error:
             raise PositioningError(
-                f"{self._cell.name}: no further tap is commanded, but the module could not be told: {error}"
+                f"{self._cell}: no further tap is commanded, but the module could not be told: {error}"
             ) from error
 
     async def redesign(self, cell: CellConfig, design: CellDesign) -> None:
-        """Go on with other limits or another model; what the planner has learned of the contact stays.
-
-        What the model lacked is not told again; taps to come have to show whether the new one lacks any.
-        """
-        another_plant = design.model.plant != self._design.model.plant
-
-        def replan() -> None:
-            limits = positioning_cell(cell)
-            if limits != self._cell:
-                planner = tap_planner(cell, limits, design, self._module.registers)
-                planner.resume(self._planner.posterior)
-                self._cell, self._planner = limits, planner
-            if another_plant:
-                self._planner.accept_model()
-
-        await self._worker.run(replan)
-        if another_plant:
-            self._worker.belief = self._planner.posterior
-        self._predictions = self._planner.predictions
-        self._design = design
+        """Go on with other limits or another model; what the planner has learned of the contact stays."""
+        if await self._worker.run(lambda: self._planner.redesign(cell, design)):
+            self._worker.belief = self.belief
+        self._predictions = self._planner.taps.predictions
 
     def update_friction(self, snapshot: Snapshot) -> None:
         """Take over the friction that the tracker believes in; call it in the worker's thread."""
-        friction = kinetic_friction(snapshot, self._design)
-        if friction is not None:
-            shift_cycle = snapshot.batch.last_shift_cycle
-            shifted = shift_cycle not in (0, self._batch_shift_cycle)
-            self._batch_shift_cycle = shift_cycle
-            self._planner.observe_friction(*friction, batch_changed=shifted)
+        self._planner.update_friction(snapshot)
 
     async def run(self) -> None:
         """Run until cancelled; a task whose tap was interrupted by a fault of the cell is over."""
         if self._sequence.phase is TaskPhase.WAITING:
-            reason = f"{self._cell.name}: interrupted during tap {self._sequence.taps}; set the target again"
+            reason = f"{self._cell}: interrupted during tap {self._sequence.taps}; set the target again"
             self._set_sequence(task_state_machine.failed(self._sequence, reason))
         self._wake.set()
         async with asyncio.TaskGroup() as group:
-            group.create_task(self._watch_plc(), name=f"{self._cell.name} PLC target")
+            group.create_task(self._watch_plc(), name=f"{self._cell} PLC target")
             while True:
                 await self._wake.wait()
                 self._wake.clear()
@@ -245,13 +209,14 @@ class PositioningTask:
             waiting = task_state_machine.commanded(self._sequence)
             self._set_sequence(waiting)
             self._at_rest.clear()
-            fault, report = "", None
+            fault, report, next_state = "", None, self._planner.observe
             try:
                 command = TapCommand(tap.velocity_m_s, tap.stroke_m, tap.direction)
-                await self._positioner.tap(command, lambda: self._sequence is waiting)  # noqa: B023
-                report = await self._positioner.read_report()
+                report = await self._positioner.tap(command, partial(self._objection, waiting))
+            except NotCommandedError as objected:
+                report, next_state = objected.report, self._planner.replan
             except FieldbusError as error:
-                fault = f"{self._cell.name}: {error}"
+                fault = f"{self._cell}: {error}"
             except PositioningError as error:
                 fault = str(error)
             finally:
@@ -265,13 +230,19 @@ class PositioningTask:
                 # Another part lies there by now: its position says nothing of the tap.
                 self._set_sequence(task_state_machine.aborted(waiting, BY_PLC))
                 return
-            after = await self._worker.run(
-                lambda: task_state_machine.observed(waiting, self._cell, self._planner, report.position_m)  # noqa: B023
-            )
-            self._worker.belief = self._planner.posterior
-            self._predictions = self._planner.predictions
+            after = await self._worker.run(partial(next_state, waiting, report.position_m))
+            self._worker.belief = self.belief
+            self._predictions = self._planner.taps.predictions
             if self._sequence is waiting:
                 self._set_sequence(after)
+
+    def _objection(self, waiting: TaskState, report: PositioningStatus) -> str:
+        """Say why a tap is not to be made any more, from what the module shows right before it is told to."""
+        if self._sequence is not waiting:
+            return "aborted"
+        if not self._planner.is_planned_from(waiting, report.position_m):
+            return "the part no longer lies where the tap was planned from"
+        return ""
 
     async def _show_where_left(self) -> None:
         """Publish where the part has come to rest, unless another task has begun meanwhile."""
@@ -281,13 +252,17 @@ class PositioningTask:
                 self._left_at_m = report.position_m
                 self._changed()
 
-    def _report(self) -> PositioningStatus:
-        status_block = None if self._module.status_block is None else self._module.status_block.positioning
-        if status_block is None or not self._module.status.connected:
+    async def _report_at_rest(self) -> PositioningStatus:
+        """Return what the module says once no tap is under way, also none of a service before this one."""
+        block = None if self._module.status_block is None else self._module.status_block.positioning
+        if block is None or not self._module.status.connected:
             raise PositioningError(
-                f"{self._cell.name}: the module does not answer, or has no positioning registers"
+                f"{self._cell}: the module does not answer, or has no positioning registers"
             )
-        return status_block
+        if self._sequence.running or (self._at_rest.is_set() and block.state == READY):
+            return block
+        await self._at_rest.wait()
+        return await self._positioner.read_report_at_rest()
 
     def _set_sequence(self, now: TaskState) -> None:
         if now is not self._sequence:

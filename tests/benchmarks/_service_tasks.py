@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 
 from impactcell.errors import PositioningError
-from impactcell.fieldbus.tap_commands import TapCommand, TapCommander
+from impactcell.fieldbus.status_block import PositioningStatus
+from impactcell.fieldbus.tap_commands import NotCommandedError, Objection, TapCommand, TapCommander
 from impactcell.journal.audit_entries import AuditEntry
 from impactcell.records import Quality
 from impactcell.service.cell_task import CellTask
@@ -141,9 +142,13 @@ class CountedCommander(TapCommander):
 
     struck: Struck
 
-    async def tap(self, command: TapCommand) -> int:
+    async def tap(self, command: TapCommand, objection: Objection = lambda _: "") -> PositioningStatus:
         self.struck.commanded.append((command.velocity_m_s, command.stroke_m))
-        return await super().tap(command)
+        try:
+            return await super().tap(command, objection)
+        except NotCommandedError:
+            self.struck.commanded.pop()
+            raise
 
 
 def is_same(strike: tuple[float, float], command: tuple[float, float]) -> bool:

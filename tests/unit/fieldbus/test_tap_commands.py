@@ -16,7 +16,7 @@ from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap, Words
-from impactcell.fieldbus.tap_commands import TapCommand, TapCommander
+from impactcell.fieldbus.tap_commands import NotCommandedError, TapCommand, TapCommander
 from impactcell.fieldbus.transports import transport_for
 from simulator.faults import Fault, FaultKind
 from simulator.modbus_server import ModbusServer
@@ -82,8 +82,8 @@ async def ready(
 async def test_a_tap_is_made_once_and_tells_its_cycle(fpga: RegisterMap) -> None:
     device = PositioningDevice(fpga)
     async with ready(fpga, device) as (_, _, positioner):
-        assert await positioner.tap(COMMAND) == 1
-        assert await positioner.tap(COMMAND) == 2
+        assert (await positioner.tap(COMMAND)).cycle == 1
+        assert (await positioner.tap(COMMAND)).cycle == 2
     assert len(device.taps) == 2
     assert device.taps[0] == pytest.approx((0.05, 0.0012, -1), rel=1e-6)
 
@@ -100,10 +100,26 @@ async def test_a_tap_that_is_aborted_before_its_command_is_never_made(fpga: Regi
 
     device.write = write  # type: ignore[method-assign]
     async with ready(fpga, device) as (_, _, positioner):
-        with pytest.raises(PositioningError, match="aborted; nothing has been commanded"):
-            await positioner.tap(COMMAND, lambda: wanted[0])
+        with pytest.raises(NotCommandedError, match="aborted; nothing has been commanded"):
+            await positioner.tap(COMMAND, lambda _: "" if wanted[0] else "aborted")
         assert device.taps == []
-        assert await positioner.tap(COMMAND) == 1
+        assert (await positioner.tap(COMMAND)).cycle == 1
+
+
+async def test_an_objection_sees_what_the_module_shows_after_the_parameters(fpga: RegisterMap) -> None:
+    """The part was moved while they were being written; what is struck is judged by what is shown then."""
+    device = PositioningDevice(fpga)
+    velocity = fpga["command_velocity"].address
+    device.on_read.append((velocity, lambda: device.put("part_position", 0.004)))
+    async with ready(fpga, device) as (_, _, positioner):
+        with pytest.raises(NotCommandedError, match="moved; nothing has been commanded") as objected:
+            await positioner.tap(COMMAND, lambda report: "moved" if report.position_m > 0.001 else "")
+        assert objected.value.report.position_m == pytest.approx(0.004)
+        assert device.taps == []
+        device.on_command = lambda: device.put("part_position", 0.009)
+        done = await positioner.tap(COMMAND)
+    assert (done.accepted_command, done.cycle) == (1, 1)
+    assert done.position_m == pytest.approx(0.009)
 
 
 async def test_a_report_at_rest_is_one_of_a_module_that_is_ready(fpga: RegisterMap) -> None:
@@ -131,7 +147,7 @@ async def test_the_command_after_the_last_number_is_the_first_and_never_none(fpg
     device.on_command = lambda: numbers.append(int(device.get("command_accepted")))
     async with ready(fpga, device) as (_, _, positioner):
         for cycle in (1, 2):
-            assert await positioner.tap(COMMAND) == cycle
+            assert (await positioner.tap(COMMAND)).cycle == cycle
     assert numbers == [2**32 - 1, 1]
 
 
@@ -159,7 +175,7 @@ async def test_numbers_of_commands_begin_anew_where_the_narrower_register_ends(
     device.on_command = lambda: numbers.append(int(device.get("command_accepted")))
     async with ready(narrow, device) as (_, _, positioner):
         for cycle in (1, 2, 3):
-            assert await positioner.tap(COMMAND) == cycle
+            assert (await positioner.tap(COMMAND)).cycle == cycle
     assert numbers == [last, 1, 2]
 
 
@@ -189,7 +205,7 @@ async def test_a_command_that_was_never_taken_does_not_keep_the_next_from_being_
     device.put("command_accepted", accepted)
     device.put("command_sequence", written)
     async with ready(narrow, device) as (_, _, positioner):
-        assert await positioner.tap(COMMAND) == 1
+        assert (await positioner.tap(COMMAND)).cycle == 1
     assert (device.get("command_accepted"), len(device.taps)) == (next_one, 1)
 
 
@@ -207,7 +223,7 @@ async def test_a_command_whose_register_shows_no_number_is_counted_on_from_what_
     got = device.get
     device.get = lambda name: got(name) if device.image[number.address] != 0xFFFF else 0  # type: ignore[method-assign]
     async with ready(narrow, device) as (_, _, positioner):
-        assert await positioner.tap(COMMAND) == 1
+        assert (await positioner.tap(COMMAND)).cycle == 1
     assert (got("command_accepted"), len(device.taps)) == (5, 1)
 
 
@@ -221,7 +237,7 @@ async def test_a_module_that_takes_no_command_is_told_and_the_next_one_is_anothe
             await positioner.tap(COMMAND)
     device.write = take  # type: ignore[method-assign]
     async with ready(fpga, device) as (_, _, positioner):
-        assert await positioner.tap(COMMAND) == 1
+        assert (await positioner.tap(COMMAND)).cycle == 1
     assert (device.get("command_accepted"), len(device.taps)) == (2, 1)
 
 
@@ -247,7 +263,7 @@ async def test_an_answer_lost_with_the_connection_does_not_repeat_the_tap(fpga: 
     device = PositioningDevice(fpga)
     async with ready(fpga, device) as (server, _, positioner):
         device.on_command = server.drop_clients
-        assert await positioner.tap(COMMAND) == 1
+        assert (await positioner.tap(COMMAND)).cycle == 1
     assert len(device.taps) == 1
 
 
@@ -258,8 +274,8 @@ async def test_a_module_in_trouble_for_a_moment_makes_the_tap_once(fpga: Registe
     async with ready(fpga, device) as (server, _, positioner):
         for _ in range(3):
             server.faults.inject(Fault(FaultKind.EXCEPTION, 0.5, remaining=4, code=code))
-        assert await positioner.tap(COMMAND) == 1
-        assert (await positioner.read_report()).accepted_command == 1
+        assert (await positioner.tap(COMMAND)).cycle == 1
+        assert (await positioner.read_report_at_rest()).accepted_command == 1
     assert len(device.taps) == 1
 
 
@@ -284,7 +300,7 @@ async def test_a_module_that_cannot_be_read_is_given_up(fpga: RegisterMap) -> No
     async with ready(fpga, device, patience_s=0.5) as (server, _, positioner):
         server.faults.inject(Fault(FaultKind.EXCEPTION, code=4))
         with pytest.raises(PositioningError, match="has not been read for"):
-            await positioner.read_report()
+            await positioner.read_report_at_rest()
 
 
 @pytest.mark.parametrize(
@@ -410,7 +426,7 @@ async def test_a_tap_that_its_registers_round_or_clip_is_not_commanded(
         with pytest.raises(PositioningError, match=told + " nothing has been commanded"):
             await positioner.tap(command)
         assert device.get("command_velocity") == 0.0
-        assert await positioner.tap(TapCommand(0.1, 0.0015, 1)) == 1
+        assert (await positioner.tap(TapCommand(0.1, 0.0015, 1))).cycle == 1
     assert device.taps == [(pytest.approx(0.1), pytest.approx(0.0015), 1)]
 
 

@@ -12,6 +12,7 @@ from impactcell.numerics.raster import Raster
 from impactcell.positioning import SafetyLimits, Tap, TapPlanner
 from impactcell.positioning.safety_limits import check_tap
 from impactcell.positioning.task_state_machine import (
+    MOST_REPLANS,
     MOST_TAPS,
     PositioningCell,
     TaskPhase,
@@ -21,6 +22,7 @@ from impactcell.positioning.task_state_machine import (
     commanded,
     failed,
     observed,
+    replan,
 )
 from impactcell.records import LARGEST_STATISTIC
 
@@ -187,6 +189,30 @@ def test_a_lost_link_and_an_abort_at_any_moment() -> None:
         assert begin_task(stopped, CELL, made, **GOOD).phase is TaskPhase.COMMANDING
         assert begin_task(lost, CELL, made, **GOOD).phase is TaskPhase.COMMANDING
     assert observed(aborted(sequence, "PLC"), CELL, made, 9e-3).phase is TaskPhase.IDLE  # a late answer
+
+
+def test_a_tap_before_which_the_part_has_moved_is_planned_anew_and_not_counted() -> None:
+    sequence, made = waiting()
+    again = replan(sequence, CELL, made, 5e-3)
+    assert (again.phase, again.taps, again.position_m) == (TaskPhase.COMMANDING, 0, 5e-3)
+    assert again.tap != sequence.tap
+    assert (again.start_m, made.posterior.taps) == (sequence.start_m, 0)
+    there = replan(commanded(again), CELL, made, GOOD["target_m"])
+    assert (there.phase, there.reason, there.outcome.taps) == (TaskPhase.SETTLED, "in place", 0)
+
+
+def test_a_part_that_moves_before_each_tap_stops_with_an_alarm_unless_one_is_made() -> None:
+    sequence, made = waiting()
+    for number in range(MOST_REPLANS):
+        again = replan(sequence, CELL, made, 2e-3 + 1e-4 * number)
+        assert again.phase is TaskPhase.COMMANDING
+        sequence = commanded(again)
+    last = replan(sequence, CELL, made, 8e-3)
+    assert last.phase is TaskPhase.FAULTED
+    assert last.reason == f"press 3: the part has moved {MOST_REPLANS + 1} times before tap 1 was made"
+    assert sequence.tap is not None
+    struck = observed(sequence, CELL, made, sequence.position_m + sequence.tap.expected_m)
+    assert replan(commanded(struck), CELL, made, 8e-3).phase is TaskPhase.COMMANDING
 
 
 def test_no_position_is_a_fault() -> None:

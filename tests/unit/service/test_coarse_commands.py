@@ -1,12 +1,12 @@
 """A positioning task whose module is commanded by whole numbers plans, makes and learns from those taps."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from impactcell.fieldbus.tap_commands import TapCommand
+from impactcell.fieldbus.status_block import PositioningStatus
+from impactcell.fieldbus.tap_commands import Objection, TapCommand
 from impactcell.service.factory import cell_design
 from impactcell.service.positioning import PositioningTask
 from impactcell.settings import CellConfig
@@ -39,7 +39,7 @@ class Recorder:
         self.position_m = 0.0
         task._positioner = self  # type: ignore[assignment]
 
-    async def tap(self, command: TapCommand, _is_wanted: Callable[[], bool]) -> int:
+    async def tap(self, command: TapCommand, _objection: Objection) -> PositioningStatus:
         shown = {
             name: float(self.registers[name].decode(self.registers[name].encode(value)))  # type: ignore[arg-type]
             for name, value in command.parameters.items()
@@ -51,12 +51,8 @@ class Recorder:
         assert (planned.velocity_m_s, planned.stroke_m) == pytest.approx(self.taps[-1], rel=1e-9)
         self.position_m += planned.expected_m
         self.module.shown = block(position_m=self.position_m)
-        return len(self.taps)
-
-    async def read_report(self) -> object:
-        return (await self.module.read_status()).positioning
-
-    read_report_at_rest = read_report
+        assert self.module.shown.positioning is not None
+        return self.module.shown.positioning
 
 
 async def test_no_tap_passes_a_limit_because_its_register_rounds(tmp_path: Path, coarse: CellConfig) -> None:

@@ -1,11 +1,11 @@
 """A PLC that takes a part away before the outcome of its last tap has been read."""
 
 import asyncio
-from collections.abc import Callable
 
 import pytest
 
 from impactcell.fieldbus.status_block import PositioningStatus
+from impactcell.fieldbus.tap_commands import Objection
 from impactcell.service.positioning import PositioningTask
 from tests.told_module import ToldModule, block
 
@@ -17,16 +17,13 @@ class Tapper:
         self.module, self.task, self.taken_away, self.taps = module, task, taken_away, 0
         self.position_m = 0.0
 
-    async def tap(self, command: object, is_wanted: Callable[[], bool] = lambda: True) -> int:
+    async def tap(self, _command: object, _objection: Objection) -> PositioningStatus:
         self.taps += 1
         tap = self.task._sequence.tap
         assert tap is not None
         self.position_m += tap.expected_m
         another = {"target_sequence": 2, "target_m": 0.02}
         self.module.shown = block(**another) if self.taken_away else block(position_m=self.position_m)
-        return self.taps
-
-    async def read_report(self) -> PositioningStatus:
         assert self.module.shown.positioning is not None
         return self.module.shown.positioning
 

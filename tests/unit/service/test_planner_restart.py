@@ -99,7 +99,7 @@ async def test_a_shift_of_the_batch_before_a_restart_is_no_news_after_it(
     shifted = replace(snapshot, batch=replace(snapshot.batch, last_shift_cycle=5))
     worker._snapshot = shifted
     task = task_of(cell, design, worker)
-    with patch.object(type(task._planner), "observe_friction") as told:
+    with patch.object(type(task._planner.taps), "observe_friction") as told:
         task.update_friction(shifted)
         task.update_friction(replace(shifted, batch=replace(shifted.batch, last_shift_cycle=8)))
     assert [call.kwargs["batch_changed"] for call in told.call_args_list] == [False, True]

@@ -1,11 +1,11 @@
 """Which of what the PLC shows as its target is a new one: neither a 0, nor what the service has looked at."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
 
 from impactcell.fieldbus.status_block import PositioningStatus
+from impactcell.fieldbus.tap_commands import Objection
 from impactcell.service.positioning import PositioningTask
 from tests.told_module import ToldModule, block
 
@@ -20,7 +20,7 @@ class Tapper:
         self.taps, self.position_m = 0, 0.0
         task._positioner = self  # type: ignore[assignment]
 
-    async def tap(self, _command: object, _is_wanted: Callable[[], bool]) -> int:
+    async def tap(self, _command: object, _objection: Objection) -> PositioningStatus:
         self.taps += 1
         tap = self.task._sequence.tap
         assert tap is not None
@@ -29,14 +29,12 @@ class Tapper:
         if self.looked_at:
             await self.module.read_status()
             await self.task._read_plc_target()
-        return self.taps
+        return await self.read_report_at_rest()
 
-    async def read_report(self) -> PositioningStatus:
+    async def read_report_at_rest(self) -> PositioningStatus:
         shown = (await self.module.read_status()).positioning
         assert shown is not None
         return shown
-
-    read_report_at_rest = read_report
 
 
 @pytest.mark.parametrize("looked_at", [True, False])

@@ -2,7 +2,6 @@
 
 import asyncio
 import math
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import pytest
 
 from impactcell.errors import FieldbusError, LinkError, PositioningError
 from impactcell.fieldbus.status_block import PositioningStatus, StatusBlock
+from impactcell.fieldbus.tap_commands import NotCommandedError, Objection
 from impactcell.service.factory import cell_design
 from impactcell.service.positioning import PositioningTask
 from impactcell.service.publisher import CellPublisher
@@ -33,29 +33,28 @@ class Striker:
         self.abort_fault: FieldbusError | None = None
         task._positioner = self  # type: ignore[assignment]
 
-    async def tap(self, _command: object, is_wanted: Callable[[], bool]) -> int:
+    async def tap(self, _command: object, objection: Objection) -> PositioningStatus:
         tap = self.task._sequence.tap
         assert tap is not None
         self.began.set()
         await self.goes_on.wait()
         if self.fault is not None:
             raise self.fault
-        if not is_wanted():
-            raise PositioningError("aborted; nothing has been commanded")
+        report = await self.read_report_at_rest()
+        if objection(report):
+            raise NotCommandedError("nothing has been commanded", report)
         self.taps += 1
-        self.position_m += tap.expected_m
+        self.position_m += tap.expected_m * tap.direction
         self.show()
-        return self.taps
+        return await self.read_report_at_rest()
 
     def show(self, **more: Any) -> None:
         self.module.shown = block(position_m=self.position_m, target_sequence=self.sequence, **more)
 
-    async def read_report(self) -> PositioningStatus:
+    async def read_report_at_rest(self) -> PositioningStatus:
         shown: StatusBlock = await self.module.read_status()
         assert shown.positioning is not None
         return shown.positioning
-
-    read_report_at_rest = read_report
 
     async def abort(self) -> None:
         if self.abort_fault is not None:
@@ -163,7 +162,8 @@ async def test_what_remains_after_a_fault_is_from_where_its_tap_has_left_the_par
     async def at_rest_later() -> PositioningStatus:
         asked.set()
         await answers.wait()
-        return await striker.read_report()
+        assert striker.module.shown.positioning is not None
+        return striker.module.shown.positioning
 
     striker.read_report_at_rest = at_rest_later  # type: ignore[method-assign]
     striker.fault = PositioningError("tap not finished within 10 s; the part may have been struck")
@@ -187,10 +187,10 @@ async def test_what_remains_after_a_fault_is_not_known_where_the_module_does_not
     async def not_read() -> PositioningStatus:
         raise PositioningError("the module has not been read for 10 s")
 
-    striker.read_report = striker.read_report_at_rest = not_read  # type: ignore[method-assign]
+    striker.read_report_at_rest = not_read  # type: ignore[method-assign]
+    striker.fault = PositioningError("tap not finished within 10 s; the part may have been struck")
     striker.goes_on.set()
     await driven
-    assert striker.taps == 1
     assert task.fault is not None
     assert math.isnan(task.state.remaining_m)
 

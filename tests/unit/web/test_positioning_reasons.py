@@ -103,7 +103,7 @@ def test_the_reasons_are_found() -> None:
     for words in (
         "moved nothing", "not in place after", "lies behind", "N is not allowed", "may pass the end",
         "taps in a row", "may have been struck", "press-1: not connected", "set the target again", "PLC",
-        "in place; tap", "does not show what", "press-1: aborted",
+        "in place; tap", "does not show what", "times before tap",
     ):  # fmt: skip
         assert any(words in reason for reason in REASONS), words
 

@@ -1,0 +1,144 @@
+"""A part that has moved since its tap was planned: the tap is planned anew from where the part lies."""
+
+import asyncio
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from impactcell.fieldbus.status_block import PositioningStatus
+from impactcell.fieldbus.tap_commands import NotCommandedError, Objection, TapCommand
+from impactcell.positioning.task_state_machine import MOST_REPLANS
+from impactcell.service.cell_planner import SAME_PLACE
+from impactcell.service.positioning import PositioningTask
+from tests.told_module import ToldModule, block
+
+TOLERANCE_M = 50e-6
+
+
+class Commander:
+    """Asks as a `TapCommander` does, right before each strike, and moves the part as foretold."""
+
+    before_strike: Callable[[], object]
+
+    def __init__(self, module: ToldModule, task: PositioningTask) -> None:
+        self.module, self.task = module, task
+        self.struck_from: list[float] = []
+        self.before_strike = lambda: None
+        self.rests = asyncio.Event()
+        self.rests.set()
+        task._positioner = self  # type: ignore[assignment]
+
+    @property
+    def shown(self) -> PositioningStatus:
+        assert self.module.shown.positioning is not None
+        return self.module.shown.positioning
+
+    def show(self, **changed: Any) -> None:
+        self.module.shown = replace(self.module.shown, positioning=replace(self.shown, **changed))
+
+    async def tap(self, _command: TapCommand, objection: Objection) -> PositioningStatus:
+        self.before_strike()
+        if why := objection(self.shown):
+            raise NotCommandedError(f"{why}; nothing has been commanded", self.shown)
+        tap = self.task._sequence.tap
+        assert tap is not None
+        self.struck_from.append(self.shown.position_m)
+        self.show(position_m=self.shown.position_m + tap.direction * tap.expected_m)
+        return self.shown
+
+    async def read_report_at_rest(self) -> PositioningStatus:
+        await self.rests.wait()
+        return self.shown
+
+
+@pytest.mark.parametrize("lies_m", [0.004, 0.012, 0.00998])
+async def test_a_tap_is_planned_anew_from_where_an_earlier_tap_has_left_the_part(
+    module: ToldModule, task: PositioningTask, lies_m: float
+) -> None:
+    """It was struck from there as planned from 0, and learned from as if it had begun at 0."""
+    commander = Commander(module, task)
+    await module.read_status()
+    await task._read_plc_target()
+    commander.before_strike = lambda: commander.show(position_m=commander.shown.position_m or lies_m)
+    await task._drive()
+    [outcome] = task.outcomes
+    assert (outcome.settled, outcome.reason, task.fault) == (True, "in place", None)
+    assert outcome.position_m == pytest.approx(0.01, abs=TOLERANCE_M)
+    assert outcome.taps == len(commander.struck_from) == task.belief.taps
+    assert commander.struck_from[:1] == ([] if abs(lies_m - 0.01) < TOLERANCE_M else [lies_m])
+
+
+async def test_a_task_begins_where_the_part_lies_once_a_tap_of_before_has_ended(
+    module: ToldModule, task: PositioningTask
+) -> None:
+    """A service that was started anew, or had given a tap up, finds the module executing.
+
+    The part seemed to be in place already where the tap under way had begun at the target.
+    """
+    commander = Commander(module, task)
+    module.shown = block(state="executing", result="executing", target_m=0.0)
+    await module.read_status()
+    commander.rests.clear()
+    begun = asyncio.create_task(task._read_plc_target())
+    for _ in range(10):
+        await asyncio.sleep(0)
+    assert not begun.done()
+    assert not task.outcomes
+    commander.show(state="ready", result="done", position_m=0.004)
+    commander.rests.set()
+    await begun
+    assert task.state.running
+    assert task.state.remaining_m == pytest.approx(-0.004)
+    await task._drive()
+    assert commander.struck_from[0] == 0.004
+    assert [outcome.settled for outcome in task.outcomes] == [True]
+
+
+async def test_a_part_that_never_rests_is_not_struck_and_ends_with_a_fault_that_says_so(
+    module: ToldModule, task: PositioningTask
+) -> None:
+    commander = Commander(module, task)
+    await module.read_status()
+    await task._read_plc_target()
+    commander.before_strike = lambda: commander.show(position_m=commander.shown.position_m + 2e-4)
+    await task._drive()
+    assert commander.struck_from == []
+    assert task.fault is not None
+    assert f"the part has moved {MOST_REPLANS + 1} times before tap 1 was made" in task.fault[0]
+    assert task.belief.taps == 0
+
+
+async def test_a_position_that_is_no_longer_known_is_a_fault(
+    module: ToldModule, task: PositioningTask
+) -> None:
+    commander = Commander(module, task)
+    await module.read_status()
+    await task._read_plc_target()
+    commander.before_strike = lambda: commander.show(position_m=math.nan)
+    await task._drive()
+    assert commander.struck_from == []
+    assert task.fault is not None
+    assert "the position of the part is not known" in task.fault[0]
+
+
+@pytest.mark.parametrize("share", [-0.99, 0.99, 1.01])
+async def test_readings_of_a_part_at_rest_may_scatter(
+    module: ToldModule, task: PositioningTask, share: float
+) -> None:
+    """By half the tolerance; only what is more than that is planned for anew."""
+    commander = Commander(module, task)
+    await module.read_status()
+    await task._read_plc_target()
+    reads_m = share * SAME_PLACE * TOLERANCE_M
+    asked = []
+    commander.before_strike = lambda: (
+        asked.append(task.state.taps),
+        commander.show(position_m=commander.shown.position_m or reads_m),
+    )
+    await task._drive()
+    assert commander.struck_from[0] == reads_m
+    assert len(asked) - len(commander.struck_from) == (share > 1.0)
+    assert task.fault is None
