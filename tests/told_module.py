@@ -1,5 +1,7 @@
 """A module that shows what a test tells it to, for the positioning task of a cell."""
 
+import asyncio
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -7,6 +9,7 @@ from typing import Any
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ModuleStatus
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.status_block import PositioningStatus, StatusBlock
+from impactcell.fieldbus.tap_commands import NotCommandedError, Objection, TapCommand
 from impactcell.fieldbus.transports import transport_for
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
@@ -54,3 +57,39 @@ def worker_of(cell: CellConfig, journal: Path) -> CellWorker:
 def task_of(cell: CellConfig, module: ModuleAcquisition, worker: CellWorker) -> PositioningTask:
     """Make the task of the cell."""
     return PositioningTask(cell, cell_design(cell), module, worker, lambda: None)
+
+
+class Commander:
+    """Asks as a `TapCommander` does, right before each strike, and moves the part as foretold."""
+
+    before_strike: Callable[[], object]
+
+    def __init__(self, module: ToldModule, task: PositioningTask) -> None:
+        self.module, self.task = module, task
+        self.struck_from: list[float] = []
+        self.before_strike = lambda: None
+        self.rests = asyncio.Event()
+        self.rests.set()
+        task._positioner = self  # type: ignore[assignment]
+
+    @property
+    def shown(self) -> PositioningStatus:
+        assert self.module.shown.positioning is not None
+        return self.module.shown.positioning
+
+    def show(self, **changed: Any) -> None:
+        self.module.shown = replace(self.module.shown, positioning=replace(self.shown, **changed))
+
+    async def tap(self, _command: TapCommand, objection: Objection) -> PositioningStatus:
+        self.before_strike()
+        if why := objection(self.shown):
+            raise NotCommandedError(f"{why}; nothing has been commanded", self.shown)
+        tap = self.task._sequence.tap
+        assert tap is not None
+        self.struck_from.append(self.shown.position_m)
+        self.show(position_m=self.shown.position_m + tap.direction * tap.expected_m)
+        return self.shown
+
+    async def read_report_at_rest(self) -> PositioningStatus:
+        await self.rests.wait()
+        return self.shown

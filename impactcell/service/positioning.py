@@ -104,7 +104,9 @@ class PositioningTask:
             The target is refused; nothing has been commanded.
         """
         before = self._sequence
-        report = await self._report_at_rest()
+        await self._begin_from(before, await self._report_at_rest(), target_m)
+
+    async def _begin_from(self, before: TaskState, report: PositioningStatus, target_m: float) -> None:
         started = await self._worker.run(
             lambda: self._planner.begin(before, target_m, report, self._worker.snapshot)
         )
@@ -190,7 +192,10 @@ class PositioningTask:
                 self._log.warning("%s", error)
         before = self._sequence
         try:
-            await self.begin(target_m)
+            report = await self._report_at_rest()
+            if self._plc_targets.is_another(report.target_sequence):
+                return  # that one is looked at next
+            await self._begin_from(before, report, target_m)
         except PositioningError as error:
             self._log.warning("the PLC's target is refused: %s", error)
             self._worker.handled_target = target
@@ -240,6 +245,8 @@ class PositioningTask:
         """Say why a tap is not to be made any more, from what the module shows right before it is told to."""
         if self._sequence is not waiting:
             return "aborted"
+        if self._plc_targets.is_another(report.target_sequence):
+            return f"aborted by {BY_PLC}"
         if not self._planner.is_planned_from(waiting, report.position_m):
             return "the part no longer lies where the tap was planned from"
         return ""

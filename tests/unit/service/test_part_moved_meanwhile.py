@@ -2,56 +2,15 @@
 
 import asyncio
 import math
-from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
 
 import pytest
 
-from impactcell.fieldbus.status_block import PositioningStatus
-from impactcell.fieldbus.tap_commands import NotCommandedError, Objection, TapCommand
 from impactcell.positioning.task_state_machine import MOST_REPLANS
 from impactcell.service.cell_planner import SAME_PLACE
 from impactcell.service.positioning import PositioningTask
-from tests.told_module import ToldModule, block
+from tests.told_module import Commander, ToldModule, block
 
 TOLERANCE_M = 50e-6
-
-
-class Commander:
-    """Asks as a `TapCommander` does, right before each strike, and moves the part as foretold."""
-
-    before_strike: Callable[[], object]
-
-    def __init__(self, module: ToldModule, task: PositioningTask) -> None:
-        self.module, self.task = module, task
-        self.struck_from: list[float] = []
-        self.before_strike = lambda: None
-        self.rests = asyncio.Event()
-        self.rests.set()
-        task._positioner = self  # type: ignore[assignment]
-
-    @property
-    def shown(self) -> PositioningStatus:
-        assert self.module.shown.positioning is not None
-        return self.module.shown.positioning
-
-    def show(self, **changed: Any) -> None:
-        self.module.shown = replace(self.module.shown, positioning=replace(self.shown, **changed))
-
-    async def tap(self, _command: TapCommand, objection: Objection) -> PositioningStatus:
-        self.before_strike()
-        if why := objection(self.shown):
-            raise NotCommandedError(f"{why}; nothing has been commanded", self.shown)
-        tap = self.task._sequence.tap
-        assert tap is not None
-        self.struck_from.append(self.shown.position_m)
-        self.show(position_m=self.shown.position_m + tap.direction * tap.expected_m)
-        return self.shown
-
-    async def read_report_at_rest(self) -> PositioningStatus:
-        await self.rests.wait()
-        return self.shown
 
 
 @pytest.mark.parametrize("lies_m", [0.004, 0.012, 0.00998])

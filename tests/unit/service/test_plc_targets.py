@@ -1,5 +1,6 @@
 """Which of what the PLC shows as its target is a new one: neither a 0, nor what the service has looked at."""
 
+import asyncio
 from dataclasses import replace
 
 import pytest
@@ -7,7 +8,7 @@ import pytest
 from impactcell.fieldbus.status_block import PositioningStatus
 from impactcell.fieldbus.tap_commands import Objection
 from impactcell.service.positioning import PositioningTask
-from tests.told_module import ToldModule, block
+from tests.told_module import Commander, ToldModule, block
 
 
 class Tapper:
@@ -102,3 +103,63 @@ async def test_a_target_that_a_module_that_was_started_anew_shows_again_is_told(
     [told] = [text for text in caplog.messages if "was started anew" in text]
     assert "until target_sequence is raised" in told
     assert task._worker.handled_target == (2, 1), "nor after a restart of the service"
+
+
+async def test_a_target_that_was_withdrawn_while_the_module_executed_a_tap_is_not_begun(
+    module: ToldModule, task: PositioningTask
+) -> None:
+    """The fastest tap for it was struck, though another had stood there for seconds."""
+    commander = Commander(module, task)
+    module.shown = block(state="executing", result="executing", target_m=0.03)
+    await module.read_status()
+    commander.rests.clear()
+    begun = asyncio.create_task(task._read_plc_target())
+    for _ in range(10):
+        await asyncio.sleep(0)
+    commander.show(state="ready", position_m=0.004, target_sequence=2, target_m=0.006)
+    commander.rests.set()
+    await begun
+    assert not task.state.running
+    assert task.fault is None
+    await module.read_status()
+    await task._read_plc_target()
+    assert (task.state.running, task.state.target_m) == (True, 0.006)
+    await task._drive()
+    assert commander.struck_from[0] == 0.004
+    assert [outcome.target_m for outcome in task.outcomes] == [0.006]
+
+
+@pytest.mark.parametrize("by_plc", [True, False])
+async def test_no_tap_is_made_for_a_target_once_the_module_shows_another(
+    module: ToldModule, task: PositioningTask, by_plc: bool
+) -> None:
+    """The PLC has set it while the parameters were written, or while the link was down."""
+    commander = Commander(module, task)
+    module.shown = block(target_sequence=int(by_plc))
+    await module.read_status()
+    await task._read_plc_target()
+    if not by_plc:
+        await task.begin(0.01)
+    commander.before_strike = lambda: commander.show(target_sequence=2, target_m=0.02)
+    await task._drive()
+    assert commander.struck_from == []
+    [outcome] = task.outcomes
+    assert (outcome.settled, outcome.reason) == (False, "aborted by the PLC, which has a new target")
+    assert task.fault is None
+    await module.read_status()
+    await task._read_plc_target()
+    await task._drive()
+    assert [outcome.settled for outcome in task.outcomes] == [False, True]
+    assert task.outcomes[-1].target_m == 0.02
+
+
+async def test_a_target_that_is_taken_back_right_before_a_tap_is_gone_on_with(
+    module: ToldModule, task: PositioningTask
+) -> None:
+    commander = Commander(module, task)
+    await module.read_status()
+    await task._read_plc_target()
+    commander.before_strike = lambda: commander.show(target_sequence=0)
+    await task._drive()
+    [outcome] = task.outcomes
+    assert (outcome.settled, outcome.taps) == (True, len(commander.struck_from))
