@@ -9,7 +9,7 @@ from typing import Any
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ModuleStatus
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.status_block import PositioningStatus, StatusBlock
-from impactcell.fieldbus.tap_commands import NotCommandedError, Objection, TapCommand
+from impactcell.fieldbus.tap_commands import Objection, ObjectionError, TapCommand
 from impactcell.fieldbus.transports import transport_for
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
@@ -63,6 +63,7 @@ class Commander:
     """Asks as a `TapCommander` does, right before each strike, and moves the part as foretold."""
 
     before_strike: Callable[[], object]
+    sent = False
 
     def __init__(self, module: ToldModule, task: PositioningTask) -> None:
         self.module, self.task = module, task
@@ -83,7 +84,8 @@ class Commander:
     async def tap(self, _command: TapCommand, objection: Objection) -> PositioningStatus:
         self.before_strike()
         if why := objection(self.shown):
-            raise NotCommandedError(f"{why}; nothing has been commanded", self.shown)
+            struck = "the part may have been struck" if self.sent else "nothing has been commanded"
+            raise ObjectionError(f"{why}; {struck}", self.shown, sent=self.sent)
         tap = self.task._sequence.tap
         assert tap is not None
         self.struck_from.append(self.shown.position_m)

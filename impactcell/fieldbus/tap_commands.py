@@ -55,12 +55,12 @@ class TapCommand:
         return dict(zip(PARAMETERS, (self.velocity_m_s, self.stroke_m, self.direction), strict=True))
 
 
-class NotCommandedError(PositioningError):
-    """A tap that somebody objected to at the last moment; `report` is what the module showed then."""
+class ObjectionError(PositioningError):
+    """A tap that was objected to, by what `report` shows; `sent`: a request to strike was, without answer."""
 
-    def __init__(self, message: str, report: PositioningStatus) -> None:
+    def __init__(self, message: str, report: PositioningStatus, *, sent: bool = False) -> None:
         super().__init__(message)
-        self.report = report
+        self.report, self.sent = report, sent
 
 
 class TapCommander:
@@ -96,7 +96,7 @@ class TapCommander:
 
         Raises
         ------
-        NotCommandedError
+        ObjectionError
             If there was an objection.
         PositioningError
             If the command is refused, aborted or not finished in time; the message says whether the part may
@@ -124,9 +124,8 @@ class TapCommander:
                         f"{cell}: tap not finished within {self._patience_s:g} s; the module has not taken "
                         f"command {sequence}, register command_accepted ({self._accepted_at}) shows {shown}"
                     ) from None
-                struck = "the part may have been struck" if sequence else "nothing has been commanded"
                 raise PositioningError(
-                    f"{cell}: tap not finished within {self._patience_s:g} s; {struck}"
+                    f"{cell}: tap not finished within {self._patience_s:g} s; {_struck(bool(sequence))}"
                 ) from None
 
     async def read_report_at_rest(self) -> PositioningStatus:
@@ -147,12 +146,12 @@ class TapCommander:
                     await asyncio.sleep(_POLL_S)
         except TimeoutError:
             if report is None:
-                why = f"{cell}: the module has not been read for {self._patience_s:g} s"
+                fault = f"{cell}: the module has not been read for {self._patience_s:g} s"
             else:
-                why = (
+                fault = (
                     f"{cell}: the module has not been ready for {self._patience_s:g} s, it is {report.state}"
                 )
-            raise PositioningError(why) from None
+            raise PositioningError(fault) from None
 
     async def abort(self) -> None:
         """Abort what is being executed.
@@ -183,9 +182,9 @@ class TapCommander:
                     f"{shown:g}; nothing has been commanded"
                 )
 
-    def _ask(self, objection: Objection, report: PositioningStatus) -> None:
+    def _ask(self, objection: Objection, report: PositioningStatus, *, sent: bool = False) -> None:
         if why := objection(report):
-            raise NotCommandedError(f"{self._module.cell}: {why}; nothing has been commanded", report)
+            raise ObjectionError(f"{self._module.cell}: {why}; {_struck(sent)}", report, sent=sent)
 
     async def _read_positioning(self) -> tuple[int, PositioningStatus]:
         """Return session and a fresh report, waiting for the link if it is down."""
@@ -260,7 +259,7 @@ class TapCommander:
         Where it takes another one than `accepted` meanwhile, that of an earlier command, nothing is written.
         """
         cell = self._module.cell
-        written = False
+        sent = written = False
         while True:
             session_now, positioning = await self._read_positioning()
             if session_now != session:
@@ -277,15 +276,19 @@ class TapCommander:
                         f"{accepted} to {positioning.accepted_command} before command {sequence} was "
                         "written: the module has taken an earlier one; the part may have been struck"
                     )
-                self._ask(objection, positioning)
+                self._ask(objection, positioning, sent=sent)
                 try:
                     await self._module.register_client.write_values({"command_sequence": sequence})
                     written = True
                 except FieldbusError as error:
                     if not _may_pass(error):
-                        raise PositioningError(f"{cell}: {error}; nothing has been commanded") from error
-                    # whether it arrived is seen in the next report
+                        raise PositioningError(f"{cell}: {error}; {_struck(sent)}") from error
+                    sent = True  # whether it arrived is seen in the next report
             await asyncio.sleep(_POLL_S)
+
+
+def _struck(maybe: bool) -> str:  # noqa: FBT001
+    return "the part may have been struck" if maybe else "nothing has been commanded"
 
 
 def _may_pass(error: FieldbusError) -> bool:

@@ -9,6 +9,8 @@ from impactcell.german.patterns import behind_names, by_patterns
 NOT_COMMANDED: Final = "; nothing has been commanded"
 """Behind what kept a tap from being commanded."""
 _NOT_COMMANDED_GERMAN: Final = "; es wurde nichts befohlen"
+_STRUCK: Final = "; the part may have been struck"
+_STRUCK_GERMAN: Final = "; das Teil kann gestoßen worden sein"
 _REMAIN: Final = r"(?P<a>\S+) µm remain, "
 _REMAIN_GERMAN: Final = r"\g<a> µm fehlen, "
 _PROBABLY: Final = r"with a probability above (?P<p>\S+)"
@@ -90,20 +92,23 @@ GERMAN: Final = {
         r"Register \1 (\2) zeigt nicht, was geschrieben wurde" + _NOT_COMMANDED_GERMAN,
     r"register (\S+) \((\d+)\) cannot express (?P<a>\S+), it would show (?P<b>\S+)" + NOT_COMMANDED:
         r"Register \1 (\2) kann \g<a> nicht ausdrücken, es zeigte \g<b>" + _NOT_COMMANDED_GERMAN,
+    r"the part no longer lies where the tap was planned from" + NOT_COMMANDED:
+        "das Teil liegt nicht mehr dort, von wo aus der Stoß geplant ist" + _NOT_COMMANDED_GERMAN,
+    r"the part no longer lies where the tap was planned from" + _STRUCK:
+        "das Teil liegt nicht mehr dort, von wo aus der Stoß geplant ist" + _STRUCK_GERMAN,
     r"the part has moved (\d+) times before tap (\d+) was made":
         r"das Teil hat sich \1-mal bewegt, bevor Stoß \2 ausgeführt war",
     r"tap not finished within (\S+) s" + NOT_COMMANDED:
         r"der Stoß war nach \1 s nicht beendet" + _NOT_COMMANDED_GERMAN,
-    r"tap not finished within (\S+) s; the part may have been struck":
-        r"der Stoß war nach \1 s nicht beendet; das Teil kann gestoßen worden sein",
+    r"tap not finished within (\S+) s" + _STRUCK: r"der Stoß war nach \1 s nicht beendet" + _STRUCK_GERMAN,
     r"tap not finished within (\S+) s; the module has not taken command (\d+), "
     r"register (\S+) \((\d+)\) shows (\d+)":
         r"der Stoß war nach \1 s nicht beendet; das Modul hat den Befehl \2 nicht angenommen, "
         r"Register \3 (\4) zeigt \5",
     r"register (\S+) \((\d+)\) has changed from (\d+) to (\d+) before command (\d+) was written: "
-    r"the module has taken an earlier one; the part may have been struck":
+    r"the module has taken an earlier one" + _STRUCK:
         r"Register \1 (\2) hat sich von \3 auf \4 geändert, bevor der Befehl \5 geschrieben war: "
-        "das Modul hat einen früheren angenommen; das Teil kann gestoßen worden sein",
+        "das Modul hat einen früheren angenommen" + _STRUCK_GERMAN,
     r"module was started anew during tap (\d+)": r"das Modul wurde während Stoß \1 neu gestartet",
     r"tap (\d+): (.+)": r"Stoß \1: \2",
     r"the module has not been read for (\S+) s": r"das Modul ließ sich \1 s lang nicht lesen",
@@ -139,8 +144,10 @@ def german_positioning_reason(reason: str) -> str:
     found = behind_names(reason, GERMAN, _WORDS)
     if found is not None:
         return ": ".join([*found[0], found[1]])
-    link = reason.removesuffix(NOT_COMMANDED)
-    return german_link_fault(link) + (_NOT_COMMANDED_GERMAN if link != reason else "")
+    for end, german in ((NOT_COMMANDED, _NOT_COMMANDED_GERMAN), (_STRUCK, _STRUCK_GERMAN)):
+        if reason.endswith(end):
+            return german_link_fault(reason.removesuffix(end)) + german
+    return german_link_fault(reason)
 
 
 def _number(text: str) -> str:

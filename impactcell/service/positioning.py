@@ -14,7 +14,7 @@ from impactcell.errors import FieldbusError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.positioning_registers import READY
 from impactcell.fieldbus.status_block import PositioningStatus
-from impactcell.fieldbus.tap_commands import NotCommandedError, TapCommand, TapCommander
+from impactcell.fieldbus.tap_commands import ObjectionError, TapCommand, TapCommander
 from impactcell.positioning import PlannerPosterior, task_state_machine
 from impactcell.positioning.task_state_machine import TaskOutcome, TaskPhase, TaskState
 from impactcell.process.cell_logger import CellLogger
@@ -218,23 +218,25 @@ class PositioningTask:
             try:
                 command = TapCommand(tap.velocity_m_s, tap.stroke_m, tap.direction)
                 report = await self._positioner.tap(command, partial(self._objection, waiting))
-            except NotCommandedError as objected:
-                report, next_state = objected.report, self._planner.replan
+            except ObjectionError as objected:
+                report, fault = objected.report, str(objected) if objected.sent else ""
+                next_state = self._planner.replan
             except FieldbusError as error:
                 fault = f"{self._cell}: {error}"
             except PositioningError as error:
                 fault = str(error)
             finally:
                 self._at_rest.set()
-            if report is None and self._sequence is waiting:
-                self._set_sequence(task_state_machine.failed(waiting, fault))
+            if self._sequence is waiting:
+                if report is not None and self._plc_targets.is_another(report.target_sequence):
+                    # Another part lies there by now: its position says nothing of the tap.
+                    self._set_sequence(task_state_machine.aborted(waiting, BY_PLC))
+                    return
+                if fault:
+                    self._set_sequence(task_state_machine.failed(waiting, fault))
             if report is None or self._sequence is not waiting:  # what came of it is no other task's business
                 await self._show_where_left()
                 continue
-            if self._plc_targets.is_another(report.target_sequence):
-                # Another part lies there by now: its position says nothing of the tap.
-                self._set_sequence(task_state_machine.aborted(waiting, BY_PLC))
-                return
             after = await self._worker.run(partial(next_state, waiting, report.position_m))
             self._worker.belief = self.belief
             self._predictions = self._planner.taps.predictions

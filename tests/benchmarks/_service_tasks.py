@@ -22,7 +22,7 @@ import numpy as np
 
 from impactcell.errors import PositioningError
 from impactcell.fieldbus.status_block import PositioningStatus
-from impactcell.fieldbus.tap_commands import NotCommandedError, Objection, TapCommand, TapCommander
+from impactcell.fieldbus.tap_commands import Objection, ObjectionError, TapCommand, TapCommander
 from impactcell.journal.audit_entries import AuditEntry
 from impactcell.records import Quality
 from impactcell.service.cell_task import CellTask
@@ -146,7 +146,7 @@ class CountedCommander(TapCommander):
         self.struck.commanded.append((command.velocity_m_s, command.stroke_m))
         try:
             return await super().tap(command, objection)
-        except NotCommandedError:
+        except ObjectionError:
             self.struck.commanded.pop()
             raise
 

@@ -16,7 +16,7 @@ from impactcell.fieldbus.acquisition import ModuleAcquisition
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap, Words
-from impactcell.fieldbus.tap_commands import NotCommandedError, TapCommand, TapCommander
+from impactcell.fieldbus.tap_commands import ObjectionError, TapCommand, TapCommander
 from impactcell.fieldbus.transports import transport_for
 from simulator.faults import Fault, FaultKind
 from simulator.modbus_server import ModbusServer
@@ -100,7 +100,7 @@ async def test_a_tap_that_is_aborted_before_its_command_is_never_made(fpga: Regi
 
     device.write = write  # type: ignore[method-assign]
     async with ready(fpga, device) as (_, _, positioner):
-        with pytest.raises(NotCommandedError, match="aborted; nothing has been commanded"):
+        with pytest.raises(ObjectionError, match="aborted; nothing has been commanded"):
             await positioner.tap(COMMAND, lambda _: "" if wanted[0] else "aborted")
         assert device.taps == []
         assert (await positioner.tap(COMMAND)).cycle == 1
@@ -112,7 +112,7 @@ async def test_an_objection_sees_what_the_module_shows_after_the_parameters(fpga
     velocity = fpga["command_velocity"].address
     device.on_read.append((velocity, lambda: device.put("part_position", 0.004)))
     async with ready(fpga, device) as (_, _, positioner):
-        with pytest.raises(NotCommandedError, match="moved; nothing has been commanded") as objected:
+        with pytest.raises(ObjectionError, match="moved; nothing has been commanded") as objected:
             await positioner.tap(COMMAND, lambda report: "moved" if report.position_m > 0.001 else "")
         assert objected.value.report.position_m == pytest.approx(0.004)
         assert device.taps == []
@@ -265,6 +265,32 @@ async def test_an_answer_lost_with_the_connection_does_not_repeat_the_tap(fpga: 
         device.on_command = server.drop_clients
         assert (await positioner.tap(COMMAND)).cycle == 1
     assert len(device.taps) == 1
+
+
+@pytest.mark.parametrize("refused", [False, True])
+async def test_a_request_to_strike_that_was_not_answered_may_have_struck(
+    fpga: RegisterMap, *, refused: bool
+) -> None:
+    """It is on its way still, or was carried out and is not shown yet: nobody can say that it was not."""
+    device, number, requests = PositioningDevice(fpga), fpga["command_sequence"], []
+    take = device.write
+    async with ready(fpga, device) as (server, _, positioner):
+
+        def lose(address: int, words: Words) -> None:
+            if not address <= number.address < address + len(words):
+                take(address, words)
+                return
+            requests.append(address)
+            if len(requests) > 1:
+                raise LookupError
+            server.drop_clients()
+
+        device.write = lose  # type: ignore[method-assign]
+        with pytest.raises(PositioningError, match="; the part may have been struck") as told:
+            await positioner.tap(COMMAND, lambda _: "aborted" if requests and not refused else "")
+    assert isinstance(told.value, ObjectionError) is not refused
+    assert len(requests) == 1 + refused
+    assert device.taps == []
 
 
 @pytest.mark.parametrize("code", [4, 6, 11])

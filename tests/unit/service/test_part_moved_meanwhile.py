@@ -101,3 +101,21 @@ async def test_readings_of_a_part_at_rest_may_scatter(
     assert commander.struck_from[0] == reads_m
     assert len(asked) - len(commander.struck_from) == (share > 1.0)
     assert task.fault is None
+
+
+@pytest.mark.parametrize("another", [True, False])
+async def test_a_tap_in_doubt_is_not_planned_anew(
+    module: ToldModule, task: PositioningTask, another: bool
+) -> None:
+    """A request to strike was not answered, and the part has moved; a new target of the PLC is no fault."""
+    commander = Commander(module, task)
+    await module.read_status()
+    await task._read_plc_target()
+    commander.sent = True
+    commander.before_strike = lambda: commander.show(position_m=0.004, target_sequence=1 + another)
+    await task._drive()
+    [outcome] = task.outcomes
+    assert (commander.struck_from, outcome.settled) == ([], False)
+    assert ("the PLC" in outcome.reason) is another
+    assert (task.fault is None) is another
+    assert outcome.reason.endswith("; the part may have been struck") is not another

@@ -10,7 +10,7 @@ import pytest
 
 from impactcell.errors import FieldbusError, LinkError, PositioningError
 from impactcell.fieldbus.status_block import PositioningStatus, StatusBlock
-from impactcell.fieldbus.tap_commands import NotCommandedError, Objection
+from impactcell.fieldbus.tap_commands import Objection, ObjectionError
 from impactcell.service.factory import cell_design
 from impactcell.service.positioning import PositioningTask
 from impactcell.service.publisher import CellPublisher
@@ -42,7 +42,7 @@ class Striker:
             raise self.fault
         report = await self.read_report_at_rest()
         if objection(report):
-            raise NotCommandedError("nothing has been commanded", report)
+            raise ObjectionError("nothing has been commanded", report)
         self.taps += 1
         self.position_m += tap.expected_m * tap.direction
         self.show()

@@ -27,6 +27,7 @@ SAID_BY = (
     "fieldbus/tap_commands.py",
 )
 """Where a task can say why it ends, or is refused."""
+SAID_AS = ("PositioningError", "ObjectionError", "Unreachable")
 NO_TASK = re.compile(
     r"tap planner: .*|remaining distance must .*|(mass|position) of the part must .*|"
     r"cannot (learn from|use a) .*"
@@ -37,6 +38,9 @@ STANDS_FOR = {
     "error": ["not connected"],
     "answer.reason": ["tap 7 moved nothing"],
     "by": ["anna"],
+    "why": ["the part no longer lies where the tap was planned from"],
+    "_struck(sent)": ["nothing has been commanded", "the part may have been struck"],
+    "_struck(bool(sequence))": ["nothing has been commanded", "the part may have been struck"],
     "miss": ["tap 7 moved nothing"],
     "positioning.result": ["7"],
 }
@@ -76,7 +80,9 @@ def said(source: Path) -> Iterator[str]:
     named = {target.id: value for target, value in assigned if isinstance(target, ast.Name)}
     for node in nodes:
         match node:
-            case ast.Call(func=ast.Name(id="PositioningError" | "Unreachable"), args=[text]):
+            case ast.Call(
+                func=ast.Name(id="PositioningError" | "ObjectionError" | "Unreachable"), args=[text, *_]
+            ):
                 yield from strings(text, named)
             case ast.Call(func=ast.Name(id="failed") | ast.Attribute(attr="failed"), args=[_, text, *_]):
                 yield from strings(text, named)
@@ -133,6 +139,10 @@ def test_every_reason_has_its_german(reason: str) -> None:
         (
             "press-1: 10.0.0.9:502 device 1: no connection within 0.5 s; nothing has been commanded",
             "press-1: 10.0.0.9:502 Gerät 1: keine Verbindung innerhalb von 0,5 s; es wurde nichts befohlen",
+        ),
+        (
+            "press-1: m:502 device 1: no connection within 1 s; the part may have been struck",
+            "press-1: m:502 Gerät 1: keine Verbindung innerhalb von 1 s; das Teil kann gestoßen worden sein",
         ),
         ("in place; tap 3 moved nothing", "am Ziel; Stoß 3 hat nichts bewegt"),
         ("what nobody has translated", "what nobody has translated"),
