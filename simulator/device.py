@@ -11,6 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from impactcell.fieldbus.positioning_registers import is_ahead, last_sequence
 from impactcell.fieldbus.registers import RegisterMap, Words
 from simulator.announcements import BatchAnnouncer
 from simulator.commands import CommandResult, ModuleState, commanded, show_part, show_ready, show_result
@@ -64,6 +65,7 @@ class Device:
         self.scenario = scenario
         self._image = RegisterImage(registers, session)
         self._recording = Recording.of(registers)
+        self._last_command = last_sequence(registers)
         self._epoch_ns = epoch_ns
         self._began_s = now_s
         self._now_s = 0.0
@@ -230,8 +232,9 @@ class Device:
         self._announcements.take()
         if self._image.get("command_abort"):
             self._abort()
-        if self._image.get("command_sequence") not in (0, commanded):
-            self._command(int(self._image.get("command_sequence")))
+        number, accepted = int(self._image.get("command_sequence")), int(self._image.get("command_accepted"))
+        if number != commanded and is_ahead(number, accepted, self._last_command):
+            self._command(number)
 
     def _show_part(self) -> None:
         show_part(self._image, self._parts, mass_stated=self.scenario.part.mass_stated)

@@ -51,5 +51,27 @@ def commanded_values(registers: RegisterMap, name: str) -> Raster:
 
 def last_sequence(registers: RegisterMap) -> int:
     """Return the largest number of a command that the registers of a positioning cell show; then comes 1."""
-    ranges = (code_range(registers[name].kind) for name in _NUMBERED)
-    return min(_MOST_COMMANDS, *(most for _, most in filter(None, ranges)))
+    ranges = (code_range(registers[name].kind) for name in _NUMBERED if name in registers)
+    return min((_MOST_COMMANDS, *(most for _, most in filter(None, ranges))))
+
+
+def is_ahead(number: int, accepted: int, last: int) -> bool:
+    """Whether a command comes after the last one that was taken, by serial arithmetic (RFC 1982).
+
+    Numbers run from 1 to `last` and begin anew with 1; what is up to half of them further on is ahead, the
+    rest behind. Where none was taken yet, 0, every number is ahead.
+
+    >>> is_ahead(1, 9999, 9999), is_ahead(9999, 1, 9999), is_ahead(7, 0, 9999)
+    (True, False, True)
+    """
+    return number != 0 and (accepted == 0 or 0 < (number - accepted) % last <= last // 2)
+
+
+def next_sequence(accepted: int, written: int, last: int) -> int:
+    """Return the number of the next command: after the last one taken, or one that was written after that.
+
+    >>> next_sequence(4, 0, 9999), next_sequence(4, 5, 9999), next_sequence(4, 2, 9999)
+    (5, 6, 5)
+    """
+    after = written % last + 1
+    return after if written and is_ahead(after, accepted, last) else accepted % last + 1

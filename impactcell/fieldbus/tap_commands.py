@@ -1,9 +1,9 @@
 """Positioning taps: commanded with a read-back and a handshake, so that none is made twice or by accident.
 
-The parameters are written and read back; only then the command's sequence number is written, and a change of
-that is what the module acts on. Writing the same number again does nothing, so a command whose answer was
-lost with the link is repeated safely. For the same reason the next command has another number than one that
-still stands there and was not taken.
+The parameters are written and read back; only then the command's sequence number is written, and one ahead
+of the last that it has taken is what the module acts on. Writing the same number again does nothing, so a
+command whose answer was lost with the link is repeated safely. For the same reason the next command has
+another number than one that still stands there and was not taken.
 """
 
 import asyncio
@@ -28,6 +28,7 @@ from impactcell.fieldbus.positioning_registers import (
     PARAMETERS,
     READY,
     last_sequence,
+    next_sequence,
 )
 from impactcell.fieldbus.status_block import PositioningStatus, integer
 
@@ -235,7 +236,7 @@ class TapCommander:
         return status.positioning.accepted_command
 
     async def _next_sequence(self, accepted: int) -> int:
-        """Return a number that is neither the last one taken nor the last one written."""
+        """Return the number of the next command, from what the registers show."""
         register, last = self._module.registers["command_sequence"], last_sequence(self._module.registers)
         while True:
             await self._module.wait_connected()
@@ -247,9 +248,8 @@ class TapCommander:
                 if _may_pass(error) and not isinstance(error, NotDecimalError):
                     await asyncio.sleep(_POLL_S)
                     continue
-                written = accepted  # nobody can tell
-            sequence = (written or accepted) % last + 1
-            return sequence if sequence != accepted else sequence % last + 1
+                written = 0  # nobody can tell
+            return next_sequence(accepted, written, last)
 
     async def _execute(
         self, session: int, sequence: int, accepted: int, objection: Objection

@@ -182,9 +182,9 @@ NAMED_FAULTS: Final = (
     ),
     NamedFault(
         "command sequence does not wrap",
-        "impactcell/fieldbus/tap_commands.py",
-        "before.accepted_command % last_sequence(self._module.registers) + 1",
-        "before.accepted_command + 1",
+        "impactcell/fieldbus/positioning_registers.py",
+        "else accepted % last + 1",
+        "else accepted + 1",
         ("tests/unit/fieldbus/test_tap_commands.py",),
     ),
     NamedFault(

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from impactcell.fieldbus.positioning_registers import commanded_values
+from impactcell.fieldbus.positioning_registers import commanded_values, is_ahead, next_sequence
 from impactcell.fieldbus.register import Register
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.numerics.raster import ANY_VALUE
@@ -47,3 +47,23 @@ def test_floats_command_any_value(fpga: RegisterMap) -> None:
     whole = a_map(Register("x", 0, "u64", unit="nm"))
     assert commanded_values(whole, "x").last == pytest.approx(2**64 * 1e-9)
     assert math.isfinite(commanded_values(whole, "x").last)
+
+
+@given(st.data(), st.sampled_from([9, 9999, 32_767, 65_535, 2**32 - 1]))
+def test_the_next_command_is_ahead_of_the_last_and_another_than_the_one_that_stands_there(
+    data: st.DataObject, last: int
+) -> None:
+    """Both kinds of modules take it: those that look for a number ahead, and those that look for a change."""
+    accepted, written = data.draw(st.integers(0, last)), data.draw(st.integers(0, last))
+    number = next_sequence(accepted, written, last)
+    assert 1 <= number <= last
+    assert is_ahead(number, accepted, last)
+    assert number not in (accepted, written)
+
+
+@given(st.data(), st.sampled_from([3, 9999, 2**32 - 1]))
+def test_of_two_numbers_one_is_ahead_of_the_other(data: st.DataObject, last: int) -> None:
+    one, other = data.draw(st.integers(1, last)), data.draw(st.integers(1, last))
+    ahead = [is_ahead(one, other, last), is_ahead(other, one, last)]
+    assert sum(ahead) == (one != other)
+    assert not is_ahead(0, one, last)

@@ -189,8 +189,10 @@ async def test_numbers_of_commands_begin_anew_where_the_narrower_register_ends(
         (0, 7, 8),
         (8, 7, 9),
         (9999, 1, 2),
-        (5, 9999, 1),
+        (5, 9999, 6),
         (1, 9999, 2),
+        (9, 3, 10),
+        (9998, 1, 2),
     ],
 )
 async def test_a_command_that_was_never_taken_does_not_keep_the_next_from_being_a_change(

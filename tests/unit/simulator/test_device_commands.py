@@ -68,6 +68,24 @@ def test_the_same_command_twice_strikes_once() -> None:
     assert client.device.due_s == math.inf
 
 
+@pytest.mark.parametrize("first", [1, 2**32 - 2, 2**32 - 1])
+def test_a_request_that_is_delivered_after_a_later_one_strikes_nothing(first: int) -> None:
+    """It was held up in the network, and repeated meanwhile; numbers begin anew with 1."""
+    client, last = Client(positioning()), 2**32 - 1
+    numbers = [first, first % last + 1, (first + 1) % last + 1]
+    for made, number in enumerate(numbers, start=1):
+        client.command(number)
+        client.device.update(client.device.due_s)
+        for late in numbers[:made]:
+            client.put("command_sequence", late)
+            assert client.device.due_s == math.inf
+        assert (client.get("command_accepted"), client.get("command_result")) == (number, 2)
+        assert client.get("cycle_counter") == made
+    client.device.restart()
+    client.command(first)
+    assert client.get("command_accepted") == first
+
+
 @pytest.mark.parametrize(
     "command",
     [
