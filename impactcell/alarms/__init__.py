@@ -14,9 +14,7 @@ from impactcell.alarms.alarm_set import (
 )
 from impactcell.alarms.lifecycle import (
     AlarmEvent,
-    EventKind,
     Notification,
-    Refusal,
     Transition,
     is_retained,
     is_silenced,
@@ -31,6 +29,7 @@ from impactcell.alarms.rule import (
     RuleSettings,
 )
 from impactcell.alarms.rules import RULES
+from impactcell.alarms.transition_tables import EventKind, Refusal
 
 __all__ = [
     "NAMES",

@@ -6,16 +6,10 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from impactcell.alarms.debounce import ZERO_COUNTS, DebounceCounters, debounce, has_moved, is_news
-from impactcell.alarms.lifecycle import (
-    AlarmEvent,
-    EventKind,
-    Notification,
-    Transition,
-    expire,
-    transition,
-)
+from impactcell.alarms.lifecycle import AlarmEvent, Notification, Transition, expire, transition
 from impactcell.alarms.rule import CycleInputs, RuleContext, RuleResult, RuleSettings
 from impactcell.alarms.rules import RULES
+from impactcell.alarms.transition_tables import EventKind
 from impactcell.records import Alarm, Evidence, Shelving
 from impactcell.serialization import stored
 

@@ -3,8 +3,8 @@
 import math
 from dataclasses import astuple, dataclass, replace
 
-from impactcell.alarms.lifecycle import EventKind
 from impactcell.alarms.rule import RuleResult, RuleSettings
+from impactcell.alarms.transition_tables import EventKind
 from impactcell.records import Alarm, Evidence
 
 

@@ -112,6 +112,19 @@ def _state_7(content: dict[str, Tree]) -> dict[str, Tree]:
     return {**content, "cell": {**cell, "tracker": {**cell["tracker"], "walk_models": None}}}
 
 
+def _state_13(content: dict[str, Tree]) -> dict[str, Tree]:
+    """Date the states of alarms, wherever they are kept, as `_alarm_3` does."""
+    cell = content["cell"]
+    dated = {name: _alarm_3(alarm) for name, alarm in cell["alarms"]["alarms"].items()}
+    return {**content, "cell": {**cell, "alarms": {**cell["alarms"], "alarms": dated}}}
+
+
+def _alarm_3(content: dict[str, Tree]) -> dict[str, Tree]:
+    """Tell since when an alarm is active, which was kept as its activation; else it is not known."""
+    since = content["activation"] if content["active"] else 0
+    return {**content, "active_ns": since, "enabled_ns": 0, "comment_ns": 0}
+
+
 def _alarm_2(content: dict[str, Tree]) -> dict[str, Tree]:
     """Numbers as such instead of in hexadecimal, members of enums by their values."""
     evidence = content["evidence"]
@@ -276,8 +289,12 @@ STATE_MIGRATIONS: Final = (
     Migration(added=_under("snapshot.signature", {"t_squared_limit": math.nan, "spe_limit": math.nan})),
     Migration(added={"handled_target": None}),
     Migration(added={"cell.tracker.clock.earlier": [], "cell.tracker.expects_change": False}),
+    Migration(_state_13),
 )
-"""Of a cell's state: to formats 2 to 12. What earlier planners had not counted is nothing; how a module
+"""Of a cell's state: to formats 2 to 13. What earlier planners had not counted is nothing; how a module
 counted before it last started is not known."""
-ALARM_MIGRATIONS: Final = (Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),)
+ALARM_MIGRATIONS: Final = (
+    Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),
+    Migration(_alarm_3),
+)
 MODEL_MIGRATIONS: Final = (Migration(_model_2, renamed=_MODEL_2_RENAMED),)

@@ -59,6 +59,8 @@ class Alarm:
     activation : int
         Tells the last activation from those before: its time, or more where that is not later; 0 before the
         first.
+    active_ns, enabled_ns, comment_ns : int
+        Time at which `active`, `enabled` and `comment` came to be what they are; 0 where it is not known.
     comment, user : str
         Who acted last since the alarm became active, and the last comment of that person; empty where
         somebody else's came before.
@@ -82,3 +84,6 @@ class Alarm:
     evidence: Evidence = field(default_factory=Evidence)
     comment: str = ""
     user: str = ""
+    active_ns: int = 0
+    enabled_ns: int = 0
+    comment_ns: int = 0

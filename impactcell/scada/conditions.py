@@ -75,6 +75,7 @@ class Condition:
         self._event_id = event_id(self.cell, self.alarm)
         self._last_severity = 0
         self._time: datetime | None = None
+        self._began = datetime.now(UTC)
         input_path = RULES[name].input_node
         self._input = cell.path(input_path) if input_path else ua.NodeId()
         cell.compute(f"{name}/ShelvingState/UnshelveTime", self._unshelve_time)
@@ -131,12 +132,15 @@ class Condition:
     def _write_nodes(self) -> None:
         alarm, now = self.alarm, datetime.now(UTC)
         time_of = _time_of(alarm, self._time)
-        for path, variant in self._fields(alarm, self._last_severity, self._time):
+        fields = dict(self._fields(alarm, self._last_severity, self._time))
+        for path, variant in fields.items():
             if not path:
                 continue
+            own = fields.get((*path, "SourceTimestamp"))
+            source = time_of if own is None else own.Value
             status = GOOD if alarm.enabled or path[0] in _TOLD_WHEN_DISABLED else _DISABLED
             node = self._space.path("/".join((self.name, *path)))
-            self._values.write(node, ua.DataValue(variant, status, time_of, now))
+            self._values.write(node, ua.DataValue(variant, status, source, now))
 
     def _fields(
         self, alarm: Alarm, last_severity: int, time: datetime | None
@@ -172,13 +176,23 @@ class Condition:
         class_id = getattr(ua.ObjectIds, f"{class_name}Type")
         yield ("ConditionClassId",), ua.Variant(ua.NodeId(class_id), ua.VariantType.NodeId)
         yield ("ConditionClassName",), ua.Variant(ua.LocalizedText(class_name), _LT)
-        for name in ("Quality", "LastSeverity", "Comment"):
-            yield (name, "SourceTimestamp"), ua.Variant(time_of, ua.VariantType.DateTime)
-        yield from self._states(alarm, time_of)
+        for path, since in (
+            (("Quality", "SourceTimestamp"), self._since(0, time_of)),
+            (("LastSeverity", "SourceTimestamp"), time_of),
+            (("Comment", "SourceTimestamp"), self._since(alarm.comment_ns, time_of)),
+            (("ActiveState", "TransitionTime"), self._since(alarm.active_ns, time_of)),
+            (("EnabledState", "TransitionTime"), self._since(alarm.enabled_ns, time_of)),
+        ):
+            yield path, ua.Variant(since, ua.VariantType.DateTime)
+        yield from self._states(alarm)
         yield from _evidence(alarm)
 
+    def _since(self, time_ns: int, time_of: datetime) -> datetime:
+        """Since when something is as it is told; where that is not known, since it has been shown."""
+        return moment(time_ns) if time_ns else min(self._began, time_of)
+
     @staticmethod
-    def _states(alarm: Alarm, time_of: datetime) -> Iterator[tuple[BrowsePath, ua.Variant]]:
+    def _states(alarm: Alarm) -> Iterator[tuple[BrowsePath, ua.Variant]]:
         enabled = "Enabled" if alarm.enabled else "Disabled"
         effective = enabled
         for name, (test, true_text, false_text) in _STATES.items():
@@ -186,7 +200,6 @@ class Condition:
             yield (name,), ua.Variant(ua.LocalizedText(true_text if on else false_text), _LT)
             yield (name, "Id"), ua.Variant(on, ua.VariantType.Boolean)
             if name == "ActiveState":
-                yield (name, "TransitionTime"), ua.Variant(time_of, ua.VariantType.DateTime)
                 effective = true_text if on and alarm.enabled else enabled
         text, state = _SHELVING[alarm.shelving]
         if alarm.enabled and alarm.shelving is not Shelving.UNSHELVED:
@@ -194,7 +207,6 @@ class Condition:
         yield ("EnabledState",), ua.Variant(ua.LocalizedText(enabled), _LT)
         yield ("EnabledState", "Id"), ua.Variant(alarm.enabled, ua.VariantType.Boolean)
         yield ("EnabledState", "EffectiveDisplayName"), ua.Variant(ua.LocalizedText(effective), _LT)
-        yield ("EnabledState", "TransitionTime"), ua.Variant(time_of, ua.VariantType.DateTime)
         yield ("ShelvingState", "CurrentState"), ua.Variant(ua.LocalizedText(text), _LT)
         yield ("ShelvingState", "CurrentState", "Id"), ua.Variant(ua.NodeId(state), ua.VariantType.NodeId)
         yield ("ShelvingState", "UnshelveTime"), ua.Variant(unshelve_ms(alarm), ua.VariantType.Double)

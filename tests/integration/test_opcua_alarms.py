@@ -227,3 +227,56 @@ async def test_the_history_tells_the_same_event_ids() -> None:
             evtypes=client.get_node(ua.ObjectIds.AlarmConditionType),
         )  # fmt: skip
         assert [event.EventId for event in past] == live
+
+
+async def read(here: Site, client: Client, path: str) -> ua.DataValue:
+    return await (await here.node(client, f"WearLimit/{path}")).read_data_value()
+
+
+async def test_a_state_tells_since_when_it_is(tmp_path: Path) -> None:
+    """OPC 10000-9: TransitionTime is when the state was entered, SourceTimestamp when the value changed."""
+    async with site(directory=tmp_path) as here, await here.client("engineer") as client:
+        events = await listening(here, client)
+
+        async def since(*paths: str) -> list[object]:
+            return [(await read(here, client, path)).Value.Value for path in paths]
+
+        states = ("ActiveState/TransitionTime", "EnabledState/TransitionTime")
+        values = ("Comment/SourceTimestamp", "Quality/SourceTimestamp")
+        here.raise_alarm()
+        raised = await events.next()
+        active, enabled, comment, quality = await since(*states, *values)
+        assert active == raised.Time
+        assert enabled < raised.Time
+        assert await act(here, client, "AddComment", raised.EventId) == 0
+        commented = await events.next()
+        assert await act(here, client, "Acknowledge", raised.EventId, "") == 0
+        acknowledged = await events.next()
+        here.server.alarm(CELL, replace(here.actions.of(CELL, "WearLimit"), evidence=Evidence(size=0.02)))
+        renewed = await events.next()
+        expected = [raised.Time, enabled, commented.Time, quality]
+        assert await since(*states, *values) == expected
+        sent = [getattr(acknowledged, path) for path in (*states, *values)]
+        assert sent == expected
+        assert renewed.Time > acknowledged.Time > commented.Time > comment
+        for path in values:
+            variable = await read(here, client, path.partition("/")[0])
+            assert [variable.SourceTimestamp] == await since(path)
+
+        here.clear_alarm()
+        cleared = await events.next()
+        assert await act(here, client, "Confirm", raised.EventId, "") == 0
+        assert await since(*states, *values) == [cleared.Time, enabled, commented.Time, quality]
+        here.history.transitions[CELL] = [here.actions.of(CELL, "WearLimit")]
+        (past,) = await (await here.node(client, "")).read_event_history(
+            starttime=ua.win_epoch_to_datetime(1 << 56), numvalues=5,
+            evtypes=client.get_node(ua.ObjectIds.AlarmConditionType),
+        )  # fmt: skip
+        assert getattr(past, states[0]) == cleared.Time
+        stored = here.actions.of(CELL, "WearLimit")
+    async with site(directory=tmp_path) as here:
+        here.server.alarm(CELL, stored)
+        async with await here.client("engineer") as client:
+            times = [(await read(here, client, path)).Value.Value for path in (*states, *values)]
+            assert times[0] == cleared.Time
+            assert times[2] == commented.Time

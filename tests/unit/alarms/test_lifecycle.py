@@ -6,20 +6,22 @@ from hypothesis import strategies as st
 
 from impactcell.alarms import Message
 from impactcell.alarms.lifecycle import (
-    ANNUNCIATION,
-    DISABLED,
-    SHELVING,
-    SWITCHES,
     AlarmEvent,
-    Annunciation,
-    EventKind,
     Notification,
-    Refusal,
     annunciation,
     expire,
     is_retained,
     is_silenced,
     transition,
+)
+from impactcell.alarms.transition_tables import (
+    ANNUNCIATION,
+    DISABLED,
+    SHELVING,
+    SWITCHES,
+    Annunciation,
+    EventKind,
+    Refusal,
 )
 from impactcell.records import Alarm, Evidence, Shelving
 
@@ -291,3 +293,30 @@ def test_no_sequence_of_events_leaves_the_life_cycle(sequence):
             assert not done.alarm.acknowledged
             assert not is_silenced(done.alarm)
         now = done.alarm
+
+
+def test_each_state_knows_since_when_it_is():
+    """OPC 10000-9: TransitionTime is when the present state was entered, whatever has happened since."""
+    now = alarm()
+
+    def since(kind: EventKind, time_ns: int, **changes: object) -> tuple[int, int, int]:
+        nonlocal now
+        done = transition(now, AlarmEvent(kind, 0, time_ns, **changes))
+        assert done.refusal is None
+        now = done.alarm
+        return now.active_ns, now.enabled_ns, now.comment_ns
+
+    assert since(EventKind.SUPPRESS, 1) == (0, 0, 0)
+    assert since(EventKind.UNSUPPRESS, 2) == (0, 0, 0)
+    assert since(EventKind.ACTIVATE, 3) == (3, 0, 0)
+    assert since(EventKind.COMMENT, 4, user="ann", comment="seen") == (3, 0, 4)
+    assert since(EventKind.ACKNOWLEDGE, 5, user="ann") == (3, 0, 4)
+    assert since(EventKind.REALARM, 6) == (3, 0, 4)
+    assert since(EventKind.SHELVE_TIMED, 7, user="ann", shelve_ns=MINUTE) == (3, 0, 4)
+    assert since(EventKind.ACKNOWLEDGE, 8, user="ann", comment="seen") == (3, 0, 8)
+    assert since(EventKind.CLEAR, 9) == (9, 0, 8)
+    assert since(EventKind.CONFIRM, 10, user="ann") == (9, 0, 8)
+    assert since(EventKind.DISABLE, 11, user="eve", comment="rig") == (9, 11, 11)
+    assert since(EventKind.ENABLE, 12, user="eve") == (9, 12, 11)
+    assert since(EventKind.ACTIVATE, 13) == (13, 12, 13), "its comment is another: none"
+    assert since(EventKind.DISABLE, 14) == (14, 14, 13), "what is disabled is not active"

@@ -116,3 +116,21 @@ def test_a_transition_of_an_alarm_that_is_not_known_is_left_out_and_of_a_later_f
     assert load_alarm(dump_tree(envelope)) is None
     with pytest.raises(ValueError, match="an alarm is of format 9"):
         load_alarm(dump_tree({**load_tree(record), "format": 9}))
+
+
+@pytest.mark.parametrize(("active", "since"), [(True, 41), (False, 0)])
+def test_an_alarm_of_format_2_is_active_since_its_activation(initial: CellState, active: bool, since: int):
+    """Nothing else of it was kept: it had moved on at 43."""
+    stored = load_tree(ALARM.dumps(Alarm("WearLimit", active=active, time_ns=43, activation=41)))["content"]
+    for later in ("active_ns", "enabled_ns", "comment_ns"):
+        del stored[later]
+    read = load_alarm(dump_tree({"format": 2, "content": stored}))
+    assert read is not None
+    assert (read.active_ns, read.enabled_ns, read.comment_ns) == (since, 0, 0)
+    state = unpack_tree(pack_state(StoredState(initial)))
+    for alarm in state["content"]["cell"]["alarms"]["alarms"].values():
+        alarm |= {"active": active, "activation": 41}
+        for later in ("active_ns", "enabled_ns", "comment_ns"):
+            del alarm[later]
+    cell = unpack_state(pack_tree({**state, "format": 12}), initial).cell
+    assert {alarm.active_ns for alarm in cell.alarms.alarms} == {since}

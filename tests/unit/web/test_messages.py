@@ -6,8 +6,7 @@ from pathlib import Path
 import pytest
 
 import impactcell.web
-from impactcell.alarms import EventKind
-from impactcell.alarms.lifecycle import Refusal
+from impactcell.alarms import EventKind, Refusal
 from impactcell.german.findings import GERMAN_PHASES, GERMAN_STEPS
 from impactcell.physics.effect import Phase
 from impactcell.physics.effects import LIBRARY
