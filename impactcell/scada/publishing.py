@@ -8,7 +8,7 @@ from asyncua import ua
 
 from impactcell.opcua.node_references import read_attribute
 from impactcell.opcua.variable_store import GOOD, StoredVariable, VariableStore, moment
-from impactcell.quantities import CYCLE, MODULE, POSITIONING
+from impactcell.quantities import BY_PATH, CYCLE, MODULE, POSITIONING
 from impactcell.records import ModuleStatus, Quality, Snapshot
 from impactcell.records.quantity import Quantity, Value
 from impactcell.scada.cell_nodes import CellSpace
@@ -87,7 +87,7 @@ class CellValues:
 
     def _restate(self, time_ns: int, *, given: ua.StatusCode, missing: ua.StatusCode) -> None:
         time = moment(time_ns)
-        for path in self._seen:
+        for path in self._seen & BY_PATH.keys():
             self._variables[path][0].set_status(given if path in self._given else missing, time)
 
     def _write(self, path: str, value: Value, quality: Quality, time: datetime, now: datetime) -> None:

@@ -225,6 +225,23 @@ async def test_waiting_makes_no_figure_usable_that_the_last_cycle_did_not_give()
         assert friction.Value.Value == 0.22
 
 
+async def test_the_link_is_as_it_is_while_no_cycle_comes() -> None:
+    """A module that answers and has nothing to strike made the state of its own link uncertain."""
+    paths = [f"Module/{name}" for name in ("Connected", "CyclesReceived", "CyclesMissed", "RoundTripTime")]
+    async with site() as here, await here.client() as client:
+        here.publish(0.2)
+        status = ModuleStatus(connected=True, received=5, missed=1, round_trip_s=0.002)
+        here.server.module(CELL, status, time.time_ns())
+        before = [await _read(here, client, path) for path in paths]
+        here.server.mark_stale(CELL, time.time_ns())
+        friction = await _read(here, client, "Friction/StaticFriction")
+        assert friction.StatusCode.value == codes.UncertainNoCommunicationLastUsableValue
+        after = [await _read(here, client, path) for path in paths]
+        assert all(data.StatusCode.is_good() for data in after)
+        seen = [[(d.Value.Value, d.SourceTimestamp) for d in read] for read in (before, after)]
+        assert seen[0] == seen[1]
+
+
 async def test_only_changes_are_told() -> None:
     async with site() as here, await here.client() as client:
         here.publish(0.2)
