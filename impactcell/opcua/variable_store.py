@@ -17,10 +17,14 @@ NOT_ENCODABLE: Final = ua.StatusCode(ua.StatusCodes.BadEncodingError)
 _log = logging.getLogger(__name__)
 
 
+RASTER_NS: Final = 1_000
+"""Raster of all times that are told, nanoseconds: OPC UA keeps 100 ns, Python's datetime 1 µs."""
+
+
 def moment(time_ns: int) -> datetime:
-    """UTC time of nanoseconds since 1970; OPC UA keeps 100 ns, Python's datetime 1 µs."""
+    """UTC time of nanoseconds since 1970, on the raster."""
     seconds, rest = divmod(time_ns, 1_000_000_000)
-    return datetime.fromtimestamp(seconds, UTC).replace(microsecond=rest // 1000)
+    return datetime.fromtimestamp(seconds, UTC).replace(microsecond=rest // RASTER_NS)
 
 
 def nanoseconds(time: datetime) -> int:

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 from asyncua import Client, ua
+from asyncua.ua import ua_binary
 
 from impactcell.opcua.historical_variable import VALUES_PER_PAGE
 from impactcell.opcua.loop_share import SLICE_S
@@ -17,6 +18,7 @@ from impactcell.quantities import HISTORY
 from impactcell.records import Alarm
 from impactcell.scada import HistoryRequest, HistoryValue, ValuePage
 from tests.opcua_server import CELL, START_NS, MemoryHistory, Site, site
+from tests.snapshots import make_capture, make_snapshot
 
 SECOND_NS = 10**9
 COUNT = 25
@@ -235,6 +237,63 @@ async def test_an_answer_ends_when_its_time_is_over(here: Site, monkeypatch: pyt
     monkeypatch.setattr(here.history, "values", one_by_one(here))
     async with await here.client() as client:
         assert await answers(here, client, VARIABLE, raw(3, 6, 0)) == [[3], [4], [5]]
+
+
+async def test_a_value_has_one_time_live_and_in_the_history(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the ticks on the wire: asyncua's client rounds both, and others merge by them."""
+    ticks, decoded = set[int](), ua_binary.ua.win_epoch_to_datetime
+    snapshot = make_snapshot(make_capture(1, time_ns=START_NS + 123_456_789), 0.2)
+    time_ns = snapshot.time_ns
+    monkeypatch.setattr(
+        ua_binary.ua, "win_epoch_to_datetime", lambda epoch: ticks.add(epoch) or decoded(epoch)
+    )
+    async with site() as here, await here.client() as client:
+        here.server.publish(CELL, snapshot)
+        here.history.stored[CELL, VARIABLE] = [HistoryValue(time_ns, 0.2)]
+        ticks.clear()
+        await (await here.node(client, VARIABLE)).read_data_value()
+        live = _near(ticks, time_ns)
+        ticks.clear()
+        assert await answers(here, client, VARIABLE, raw(0, None, 1)) == [[0.2]]
+        assert _near(ticks, time_ns) == live
+        assert len(live) == 1
+
+
+def _near(ticks: set[int], time_ns: int) -> set[int]:
+    expected = time_ns // 100 + 116_444_736_000_000_000
+    return {tick for tick in ticks if abs(tick - expected) <= 10}
+
+
+SPANS_OF_SHOWN_TIMES = {
+    "forwards": ((1, 3, 0), [[1, 2]]),
+    "backwards": ((3, 1, 0), [[3, 2]]),
+    "backwards from the end": ((None, 3, 2), [[3, 2]]),
+    "one moment": ((2, 2, 1), [[2]]),
+}
+
+
+@pytest.mark.parametrize("name", SPANS_OF_SHOWN_TIMES)
+async def test_a_time_that_was_shown_is_found(name: str) -> None:
+    """Stored times are of the nanosecond; who asks knows those that were told."""
+    (start, end, number), expected = SPANS_OF_SHOWN_TIMES[name]
+    async with site() as here, await here.client() as client:
+        stored = [START_NS + i * SECOND_NS + 789 for i in range(5)]
+        here.history.stored[CELL, VARIABLE] = [HistoryValue(t, float(i)) for i, t in enumerate(stored)]
+        here.history.transitions[CELL] = [
+            Alarm("WearLimit", active=True, cycle=i, time_ns=t) for i, t in enumerate(stored)
+        ]
+        assert await answers(here, client, VARIABLE, raw(start, end, number)) == expected
+        if start != end:
+            assert await answers(here, client, "", events(start, end, number)) == expected
+
+
+async def test_a_value_at_a_bound_is_no_bound_of_its_own() -> None:
+    async with site() as here, await here.client() as client:
+        here.history.stored[CELL, VARIABLE] = [
+            HistoryValue(START_NS + i * SECOND_NS + 789, float(i)) for i in range(5)
+        ]
+        assert await answers(here, client, VARIABLE, raw(1, 3, 0, bounds=True)) == [[1, 2, 3]]
+        assert await answers(here, client, VARIABLE, raw(3, 1, 0, bounds=True)) == [[3, 2, 1]]
 
 
 def one_by_one(here: Site) -> object:
