@@ -49,13 +49,13 @@ _DISABLED: Final = ua.StatusCode(ua.StatusCodes.BadConditionDisabled)
 _log = logging.getLogger(__name__)
 
 
-def unshelve_ms(alarm: Alarm) -> float:
+def unshelve_ms(alarm: Alarm, now_ns: int) -> float:
     """Milliseconds until a shelving ends: 0 where there is none, the longest where nothing ends it."""
     if alarm.shelving is Shelving.UNSHELVED:
         return 0.0
     if alarm.shelved_until_ns <= 0:
         return MAX_SHELVE_S * 1e3
-    return max((alarm.shelved_until_ns - time.time_ns()) / 1e6, 0.0)
+    return max((alarm.shelved_until_ns - now_ns) / 1e6, 0.0)
 
 
 class Condition:
@@ -83,7 +83,7 @@ class Condition:
 
     def _unshelve_time(self) -> ua.DataValue:
         now = datetime.now(UTC)
-        variant = ua.Variant(unshelve_ms(self.alarm), ua.VariantType.Double)
+        variant = ua.Variant(unshelve_ms(self.alarm, time.time_ns()), ua.VariantType.Double)
         return ua.DataValue(variant, GOOD if self.alarm.enabled else _DISABLED, now, now)
 
     def update(self, alarm: Alarm) -> EventNotification | None:
@@ -107,7 +107,7 @@ class Condition:
 
     def past_event(self, alarm: Alarm) -> EventNotification:
         """Make the event again that told of a transition."""
-        return self._event(alarm, alarm.severity)
+        return self._event(alarm, alarm.severity, now_ns=alarm.time_ns)
 
     def present(self) -> EventNotification | None:
         """Make the event of the present state for a refresh; None where it is not to be shown."""
@@ -115,8 +115,11 @@ class Condition:
             return None
         return self._event(self.alarm, self._last_severity, self._time)
 
-    def _event(self, alarm: Alarm, last_severity: int, time: datetime | None = None) -> EventNotification:
-        fields = {path: self._sendable(path, v) for path, v in self._fields(alarm, last_severity, time)}
+    def _event(
+        self, alarm: Alarm, last_severity: int, told: datetime | None = None, now_ns: int | None = None
+    ) -> EventNotification:
+        told_fields = self._fields(alarm, last_severity, told, now_ns)
+        fields = {path: self._sendable(path, variant) for path, variant in told_fields}
         if not alarm.enabled:
             bad = ua.Variant(_DISABLED, ua.VariantType.StatusCode)
             fields = {p: v if not p or p[0] in _TOLD_WHEN_DISABLED else bad for p, v in fields.items()}
@@ -143,9 +146,9 @@ class Condition:
             self._values.write(node, ua.DataValue(variant, status, source, now))
 
     def _fields(
-        self, alarm: Alarm, last_severity: int, time: datetime | None
+        self, alarm: Alarm, last_severity: int, told: datetime | None, now_ns: int | None = None
     ) -> Iterator[tuple[BrowsePath, ua.Variant]]:
-        time_of = _time_of(alarm, time)
+        time_of = _time_of(alarm, told)
         yield from _variants(
             {
                 "EventId": (event_id(self.cell, alarm), ua.VariantType.ByteString),
@@ -184,6 +187,8 @@ class Condition:
             (("EnabledState", "TransitionTime"), self._since(alarm.enabled_ns, time_of)),
         ):
             yield path, ua.Variant(since, ua.VariantType.DateTime)
+        left_ms = unshelve_ms(alarm, time.time_ns() if now_ns is None else now_ns)
+        yield ("ShelvingState", "UnshelveTime"), ua.Variant(left_ms, ua.VariantType.Double)
         yield from self._states(alarm)
         yield from _evidence(alarm)
 
@@ -209,7 +214,6 @@ class Condition:
         yield ("EnabledState", "EffectiveDisplayName"), ua.Variant(ua.LocalizedText(effective), _LT)
         yield ("ShelvingState", "CurrentState"), ua.Variant(ua.LocalizedText(text), _LT)
         yield ("ShelvingState", "CurrentState", "Id"), ua.Variant(ua.NodeId(state), ua.VariantType.NodeId)
-        yield ("ShelvingState", "UnshelveTime"), ua.Variant(unshelve_ms(alarm), ua.VariantType.Double)
 
 
 def _message(alarm: Alarm) -> ua.LocalizedText:
@@ -218,9 +222,9 @@ def _message(alarm: Alarm) -> ua.LocalizedText:
     return TranslatedText(english, de=alarm.message_de or (english if alarm.message else title.german))
 
 
-def _time_of(alarm: Alarm, time: datetime | None) -> datetime:
+def _time_of(alarm: Alarm, told: datetime | None) -> datetime:
     """Time of an event: of the transition, unless it tells of something since; now where it is not known."""
-    return time or (moment(alarm.time_ns) if alarm.time_ns else datetime.now(UTC))
+    return told or (moment(alarm.time_ns) if alarm.time_ns else datetime.now(UTC))
 
 
 def _variants(fields: dict[str, tuple[Any, ua.VariantType]]) -> Iterator[tuple[BrowsePath, ua.Variant]]:

@@ -19,7 +19,7 @@ from impactcell.alarms import (
     initial_state,
 )
 from impactcell.alarms.rules import module_connection, positioning_fault
-from impactcell.records import Alarm, Evidence
+from impactcell.records import Alarm, Evidence, Shelving
 from tests.opcua_server import CELL, Site, site
 from tests.patience import PATIENCE_S
 
@@ -229,6 +229,26 @@ async def test_the_history_tells_the_same_event_ids() -> None:
         assert [event.EventId for event in past] == live
 
 
+async def past(here: Site, client: Client, alarm: Alarm) -> object:
+    """The event of the history that tells a transition."""
+    here.history.transitions[CELL] = [alarm]
+    (event,) = await (await here.node(client, "")).read_event_history(
+        starttime=ua.win_epoch_to_datetime(1 << 56), numvalues=5,
+        evtypes=client.get_node(ua.ObjectIds.AlarmConditionType),
+    )  # fmt: skip
+    return event
+
+
+async def test_an_event_of_the_past_tells_how_long_it_was_shelved_for() -> None:
+    """It was as long as was left when it was read: 0 of all that have ended."""
+    shelved = Alarm(
+        "WearLimit", shelving=Shelving.TIMED, time_ns=10**18, shelved_until_ns=10**18 + 90 * 10**9
+    )
+    async with site() as here, await here.client("operator") as client:
+        event = await past(here, client, shelved)
+        assert getattr(event, "ShelvingState/UnshelveTime") == 90_000.0
+
+
 async def read(here: Site, client: Client, path: str) -> ua.DataValue:
     return await (await here.node(client, f"WearLimit/{path}")).read_data_value()
 
@@ -267,12 +287,8 @@ async def test_a_state_tells_since_when_it_is(tmp_path: Path) -> None:
         cleared = await events.next()
         assert await act(here, client, "Confirm", raised.EventId, "") == 0
         assert await since(*states, *values) == [cleared.Time, enabled, commented.Time, quality]
-        here.history.transitions[CELL] = [here.actions.of(CELL, "WearLimit")]
-        (past,) = await (await here.node(client, "")).read_event_history(
-            starttime=ua.win_epoch_to_datetime(1 << 56), numvalues=5,
-            evtypes=client.get_node(ua.ObjectIds.AlarmConditionType),
-        )  # fmt: skip
-        assert getattr(past, states[0]) == cleared.Time
+        confirmed = await past(here, client, here.actions.of(CELL, "WearLimit"))
+        assert getattr(confirmed, states[0]) == cleared.Time
         stored = here.actions.of(CELL, "WearLimit")
     async with site(directory=tmp_path) as here:
         here.server.alarm(CELL, stored)
