@@ -73,7 +73,9 @@ class Condition:
         self._notifiers = notifiers
         self._event_type = cell.alarm_type(name)
         self._event_id = event_id(self.cell, self.alarm)
+        self._severity = 0
         self._last_severity = 0
+        self._severity_since: datetime | None = None
         self._time: datetime | None = None
         self._began = datetime.now(UTC)
         input_path = RULES[name].input_node
@@ -91,14 +93,16 @@ class Condition:
         if alarm is self.alarm:  # as it is from cycle to cycle, nearly always
             return None
         before, self.alarm = self.alarm, alarm
+        severity, self._severity = self._severity or alarm.severity, alarm.severity
         told = event_id(self.cell, alarm)
         if told == self._event_id:
             return None
         is_transition = (alarm.time_ns, alarm.cycle) != (before.time_ns, before.cycle)
-        self._event_id, self._last_severity = told, before.severity
-        self._time = None if is_transition else datetime.now(UTC)
+        self._event_id, self._time = told, None if is_transition else datetime.now(UTC)
+        if severity != alarm.severity:
+            self._last_severity, self._severity_since = severity, _time_of(alarm, self._time)
         self._write_nodes()
-        return self._event(alarm, before.severity, self._time)
+        return self._event(alarm, self._time)
 
     def is_current_event(self, given: bytes | None) -> bool:
         """Whether an EventId is of the alarm's present activation."""
@@ -107,18 +111,18 @@ class Condition:
 
     def past_event(self, alarm: Alarm) -> EventNotification:
         """Make the event again that told of a transition."""
-        return self._event(alarm, alarm.severity, now_ns=alarm.time_ns)
+        return self._event(alarm, is_past=True)
 
     def present(self) -> EventNotification | None:
         """Make the event of the present state for a refresh; None where it is not to be shown."""
         if not is_retained(self.alarm):
             return None
-        return self._event(self.alarm, self._last_severity, self._time)
+        return self._event(self.alarm, self._time)
 
     def _event(
-        self, alarm: Alarm, last_severity: int, told: datetime | None = None, now_ns: int | None = None
+        self, alarm: Alarm, told: datetime | None = None, *, is_past: bool = False
     ) -> EventNotification:
-        told_fields = self._fields(alarm, last_severity, told, now_ns)
+        told_fields = self._fields(alarm, told, is_past=is_past)
         fields = {path: self._sendable(path, variant) for path, variant in told_fields}
         if not alarm.enabled:
             bad = ua.Variant(_DISABLED, ua.VariantType.StatusCode)
@@ -135,7 +139,7 @@ class Condition:
     def _write_nodes(self) -> None:
         alarm, now = self.alarm, datetime.now(UTC)
         time_of = _time_of(alarm, self._time)
-        fields = dict(self._fields(alarm, self._last_severity, self._time))
+        fields = dict(self._fields(alarm, self._time))
         for path, variant in fields.items():
             if not path:
                 continue
@@ -146,9 +150,10 @@ class Condition:
             self._values.write(node, ua.DataValue(variant, status, source, now))
 
     def _fields(
-        self, alarm: Alarm, last_severity: int, told: datetime | None, now_ns: int | None = None
+        self, alarm: Alarm, told: datetime | None, *, is_past: bool = False
     ) -> Iterator[tuple[BrowsePath, ua.Variant]]:
         time_of = _time_of(alarm, told)
+        last_severity, severity_since = (0, None) if is_past else (self._last_severity, self._severity_since)
         yield from _variants(
             {
                 "EventId": (event_id(self.cell, alarm), ua.VariantType.ByteString),
@@ -181,13 +186,13 @@ class Condition:
         yield ("ConditionClassName",), ua.Variant(ua.LocalizedText(class_name), _LT)
         for path, since in (
             (("Quality", "SourceTimestamp"), self._since(0, time_of)),
-            (("LastSeverity", "SourceTimestamp"), time_of),
+            (("LastSeverity", "SourceTimestamp"), severity_since or self._since(0, time_of)),
             (("Comment", "SourceTimestamp"), self._since(alarm.comment_ns, time_of)),
             (("ActiveState", "TransitionTime"), self._since(alarm.active_ns, time_of)),
             (("EnabledState", "TransitionTime"), self._since(alarm.enabled_ns, time_of)),
         ):
             yield path, ua.Variant(since, ua.VariantType.DateTime)
-        left_ms = unshelve_ms(alarm, time.time_ns() if now_ns is None else now_ns)
+        left_ms = unshelve_ms(alarm, alarm.time_ns if is_past else time.time_ns())
         yield ("ShelvingState", "UnshelveTime"), ua.Variant(left_ms, ua.VariantType.Double)
         yield from self._states(alarm)
         yield from _evidence(alarm)

@@ -98,7 +98,9 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
     "Says that the alarm has been seen.": "Sagt, dass die Meldung gesehen wurde.",
     "Says that what was to be done has been done.": "Sagt, dass getan ist, was zu tun war.",
     "Serial number given by the manufacturer.": "Seriennummer des Herstellers.",
-    "Severity before the last event.": "Dringlichkeit vor dem letzten Ereignis.",
+    "Severity before it last changed; 0 while it has not.": (
+        "Dringlichkeit vor ihrer letzten Änderung; 0, solange es keine gab."
+    ),
     "Share of Bad values from which an aggregate is Bad, %.": (
         "Anteil schlechter Werte, ab dem ein Aggregat schlecht ist, %."
     ),

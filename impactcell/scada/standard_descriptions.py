@@ -27,7 +27,7 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
     "Id": "The state as a value that does not depend on a language.",
     "InputArguments": "Arguments of the method.",
     "InputNode": "Variable that the alarm watches; null where it is no single one.",
-    "LastSeverity": "Severity before the last event.",
+    "LastSeverity": "Severity before it last changed; 0 while it has not.",
     "MaxTimeShelved": "Longest time the alarm can be shelved, ms.",
     "Message": "What has happened, in words.",
     "OneShotShelve": "Keeps the alarm from people until it has ended once.",

@@ -1,6 +1,7 @@
 """Events of alarms: when one is sent, and for how long its EventId stands for the alarm."""
 
 import asyncio
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -251,6 +252,28 @@ async def test_an_event_of_the_past_tells_how_long_it_was_shelved_for() -> None:
 
 async def read(here: Site, client: Client, path: str) -> ua.DataValue:
     return await (await here.node(client, f"WearLimit/{path}")).read_data_value()
+
+
+async def test_the_last_severity_is_that_before_the_last_change_of_it() -> None:
+    """OPC 10000-9, 5.5.2: it is 0 at first, and a value only after a change of severity."""
+    async with site() as here, await here.client("operator") as client:
+        now_ns = time.time_ns()
+        raised = Alarm("WearLimit", active=True, acknowledged=False, time_ns=now_ns, activation=now_ns)
+        severe = replace(raised, severity=800, time_ns=now_ns + 10**6)
+        commented = replace(severe, comment="seen", time_ns=now_ns + 2 * 10**6)
+        events = await listening(here, client)
+        here.server.alarm(CELL, replace(raised, active=False, time_ns=0))
+        told = [await events.next()]
+        for alarm in (raised, severe, commented):
+            here.server.alarm(CELL, alarm)
+            told.append(await events.next())
+        assert [event.LastSeverity for event in told] == [0, 0, 500, 500]
+        since = [getattr(event, "LastSeverity/SourceTimestamp") for event in told]
+        assert since[0] == since[1]
+        assert since[2] == since[3] == told[2].Time
+        node = await read(here, client, "LastSeverity")
+        assert (node.Value.Value, node.SourceTimestamp) == (500, told[2].Time)
+        assert (await past(here, client, raised)).LastSeverity == 0
 
 
 async def test_a_state_tells_since_when_it_is(tmp_path: Path) -> None:
