@@ -91,7 +91,7 @@ def change_filter(space: AddressSpace, node: ua.NodeId, attribute: int, requeste
     Raises
     ------
     StatusCodeError
-        BadFilterNotAllowed, BadMonitoredItemFilterUnsupported or BadDeadbandFilterInvalid.
+        BadFilterNotAllowed or BadDeadbandFilterInvalid.
     """
     if requested is None or isinstance(requested, ua.ExtensionObject):
         return DataChangeFilter(ua.DataChangeTrigger.StatusValue, 0.0)
@@ -104,16 +104,12 @@ def change_filter(space: AddressSpace, node: ua.NodeId, attribute: int, requeste
     if attribute != ua.AttributeIds.Value or data.Value is None or data.Value.VariantType not in NUMERIC:
         raise StatusCodeError(ua.StatusCodes.BadFilterNotAllowed)
     deadband = float(requested.DeadbandValue)
-    if not deadband >= 0.0:
+    if requested.DeadbandType == ua.DeadbandType.Absolute and 0.0 <= deadband < math.inf:
+        return DataChangeFilter(requested.Trigger, deadband)
+    eu_span = _eu_span(space, node)
+    if requested.DeadbandType != ua.DeadbandType.Percent or eu_span is None or not 0.0 <= deadband <= 100.0:
         raise StatusCodeError(ua.StatusCodes.BadDeadbandFilterInvalid)
-    if requested.DeadbandType == ua.DeadbandType.Percent:
-        eu_span = _eu_span(space, node)
-        if eu_span is None:
-            raise StatusCodeError(ua.StatusCodes.BadMonitoredItemFilterUnsupported)
-        if deadband > 100.0:
-            raise StatusCodeError(ua.StatusCodes.BadDeadbandFilterInvalid)
-        deadband = deadband / 100.0 * eu_span
-    return DataChangeFilter(requested.Trigger, deadband)
+    return DataChangeFilter(requested.Trigger, deadband / 100.0 * eu_span)
 
 
 def _eu_span(space: AddressSpace, node: ua.NodeId) -> float | None:

@@ -258,6 +258,36 @@ async def test_only_changes_are_told() -> None:
         assert changes.queue.empty()
 
 
+async def test_a_deadband_that_cannot_be_is_refused() -> None:
+    """OPC UA Part 4, 7.22.2 knows types 0, 1 and 2; Part 8, 7.2 wants 0 to 100 % of an EURange."""
+    asked = {
+        "no such type": (7, 0.1, "Friction/StaticFriction"),
+        "nothing is ever beyond it": (1, math.inf, "Friction/StaticFriction"),
+        "no number": (1, math.nan, "Friction/StaticFriction"),
+        "more than all": (2, 101.0, "Friction/StaticFriction"),
+        "of no range": (2, 1.0, "Friction/CycleNumber"),
+    }
+    async with site() as here, await here.client() as client:
+        here.publish(0.2)
+        number = (await client.create_subscription(1000, None)).subscription_id
+
+        async def outcome(kind: int, value: float, path: str) -> int:
+            node = (await here.node(client, path)).nodeid
+            band = ua.DataChangeFilter(ua.DataChangeTrigger.StatusValue, kind, value)
+            item = ua.MonitoredItemCreateRequest(
+                ua.ReadValueId(node, ua.AttributeIds.Value),
+                ua.MonitoringMode.Reporting,
+                ua.MonitoringParameters(1, 0.0, band, 1, True),
+            )
+            wanted = ua.CreateMonitoredItemsParameters(number, ua.TimestampsToReturn.Both, [item])
+            return (await client.uaclient.create_monitored_items(wanted))[0].StatusCode.value
+
+        codes_of = {why: await outcome(*band) for why, band in asked.items()}
+        assert codes_of == dict.fromkeys(asked, codes.BadDeadbandFilterInvalid)
+        for kind, value in ((0, math.inf), (1, 0.0), (1, 0.1), (2, 100.0)):
+            assert await outcome(kind, value, "Friction/StaticFriction") == 0
+
+
 @pytest.mark.parametrize("whole_subscription", [False, True])
 async def test_an_item_on_an_object_ends_like_any_other(
     caplog: pytest.LogCaptureFixture, *, whole_subscription: bool
