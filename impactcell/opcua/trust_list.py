@@ -16,6 +16,7 @@ DER and PEM are both read, whatever the file is called.
 
 import datetime as dt
 import logging
+import shlex
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
@@ -55,6 +56,9 @@ MIN_KEY_BITS: Final = 2048
 """Shortest RSA key of the policies on offer (Part 7)."""
 MAX_CHAIN_LENGTH: Final = 5
 """Certificates from a client's to a trusted authority."""
+
+
+_NOT_TRUSTED: Final = "not in `trusted`, nor issued by an authority that is"
 
 
 class UntrustedError(Exception):
@@ -134,13 +138,16 @@ class TrustList:
             raise UntrustedError("not a certificate") from error
         try:
             self._check(certificate)
-        except UntrustedError:
-            self._reject(certificate)
-            raise
+        except UntrustedError as error:
+            kept = self._reject(certificate)
+            way = f"; look at it, and let it in with `impactcell certs trust {shlex.quote(str(kept))}`"
+            helps = kept is not None and str(error) == _NOT_TRUSTED
+            raise UntrustedError(f"{_name(certificate)}: {error}{way if helps else ''}") from error
 
     def _check(self, certificate: x509.Certificate) -> None:
         if not self.is_valid_now(certificate):
-            raise UntrustedError("not valid at this time")
+            begin, end = certificate.not_valid_before_utc, certificate.not_valid_after_utc
+            raise UntrustedError(f"not valid at this time, but from {begin:%Y-%m-%d} to {end:%Y-%m-%d}")
         key = certificate.public_key()
         if not isinstance(key, rsa.RSAPublicKey) or key.key_size < MIN_KEY_BITS:
             raise UntrustedError(f"not an RSA key of {MIN_KEY_BITS} bits or more")
@@ -159,7 +166,7 @@ class TrustList:
             if self._is_revoked(issuer):
                 raise UntrustedError("an authority of its chain is revoked")
             current = issuer
-        raise UntrustedError("not in `trusted`, nor issued by an authority that is")
+        raise UntrustedError(_NOT_TRUSTED)
 
     def _issuer_of(self, certificate: x509.Certificate) -> x509.Certificate | None:
         for folder in ("trusted", "issuers"):
@@ -196,11 +203,9 @@ class TrustList:
             if path.is_file() and not path.name.startswith("."):
                 yield path, path.read_bytes()
 
-    def _reject(self, certificate: x509.Certificate) -> None:
+    def _reject(self, certificate: x509.Certificate) -> Path | None:
         folder = self._directory / "rejected"
-        subject = certificate.subject.rfc4514_string()[:MAX_NAME]
-        name = "".join(c if c.isascii() and c.isprintable() and c not in "/\\" else "_" for c in subject)
-        path = folder / f"{name} [{thumbprint(der(certificate))}].der"
+        path = folder / f"{_name(certificate)}.der"
         try:
             rejected = sorted(folder.iterdir(), key=lambda path: path.stat().st_mtime)
             for old in rejected[: max(0, len(rejected) - MAX_REJECTED + 1)]:
@@ -208,6 +213,15 @@ class TrustList:
             path.write_bytes(der(certificate))
         except OSError as error:
             _log.warning("%s: cannot keep a rejected certificate: %s", folder, error.strerror)
+            return None
+        return path
+
+
+def _name(certificate: x509.Certificate) -> str:
+    """Name a certificate by its subject and its thumbprint, as a file may be called."""
+    subject = certificate.subject.rfc4514_string()[:MAX_NAME]
+    name = "".join(c if c.isascii() and c.isprintable() and c not in "/\\" else "_" for c in subject)
+    return f"{name} [{thumbprint(der(certificate))}]"
 
 
 def _may_issue(certificate: x509.Certificate) -> bool:

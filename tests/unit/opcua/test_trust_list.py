@@ -1,6 +1,7 @@
 """Trust list, users file and their commands, with certificates made by `cryptography` itself."""
 
 import datetime as dt
+import hashlib
 import io
 import random
 import stat
@@ -107,6 +108,27 @@ def test_directly_trusted_and_not(pki: Path) -> None:
     put(pki, "trusted", client)
     trust.check(der(client))
     trust.check(der(client) + der(certificate("ca", 1, ca=True)))
+
+
+def test_who_is_refused_is_named_with_the_way_out(pki: Path) -> None:
+    """By what the file in `rejected` and OPC UA tools show, and by the command that lets it in."""
+    trust = TrustList(pki, URI)
+    unknown, ended = certificate("client", 0), certificate("client", 0, days=-1)
+    with pytest.raises(UntrustedError) as refused:
+        trust.check(der(unknown))
+    (kept,) = (pki / "rejected").iterdir()
+    assert str(refused.value) == (
+        f"{kept.stem}: not in `trusted`, nor issued by an authority that is; look at it, and let it in with "
+        f"`impactcell certs trust '{kept}'`"
+    )
+    assert hashlib.sha1(der(unknown)).hexdigest().upper() in str(refused.value)
+    with pytest.raises(UntrustedError) as refused:
+        trust.check(der(ended))
+    assert hashlib.sha1(der(ended)).hexdigest().upper() in str(refused.value)
+    assert f"from {ended.not_valid_before_utc:%Y-%m-%d} to {ended.not_valid_after_utc:%Y-%m-%d}" in str(
+        refused.value
+    )
+    assert "certs trust" not in str(refused.value), "that would not help"
 
 
 @pytest.mark.parametrize("whose", ["the client's", "its authority's"])
