@@ -5,7 +5,7 @@ import contextlib
 import logging
 import os
 from datetime import UTC, datetime
-from typing import Any, Final
+from typing import Final
 from urllib.parse import urlsplit
 
 from asyncua import ua
@@ -14,19 +14,18 @@ from impactcell.errors import AccessError
 from impactcell.opcua.asyncua_adapter import AddressSpace, SecurityPolicyFactory, bound_null_arrays
 from impactcell.opcua.attribute_service import AttributeService
 from impactcell.opcua.authentication import Authenticator
-from impactcell.opcua.binary_codec import MAX_OPERATIONS, StatusCodeError
+from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.connection_table import ConnectionTable
-from impactcell.opcua.continuation_points import MAX_BROWSE_POINTS, MAX_HISTORY_POINTS
 from impactcell.opcua.discovery_service import POLICIES, DiscoveryService
-from impactcell.opcua.historical_variable import VALUES_PER_PAGE
 from impactcell.opcua.history_processed import AGGREGATE_FUNCTIONS
-from impactcell.opcua.history_service import MAX_NODES_PER_READ, HistoryService
+from impactcell.opcua.history_service import HistoryService
 from impactcell.opcua.host_interface import Actor, Host, RefusedError, ServerSettings
 from impactcell.opcua.languages import Languages
 from impactcell.opcua.method_service import MethodService
 from impactcell.opcua.monitored_item_service import MonitoredItemService
 from impactcell.opcua.request_dispatch import RequestDispatcher, Service
 from impactcell.opcua.secure_channel import ChannelSecurity
+from impactcell.opcua.server_description import build_info, server_description
 from impactcell.opcua.session_service import SessionService
 from impactcell.opcua.session_table import SessionTable
 from impactcell.opcua.subscription_service import SubscriptionService
@@ -209,7 +208,7 @@ class ServiceHost:
             StartTime=self._started,
             CurrentTime=now,
             State=ua.ServerState.Running,
-            BuildInfo=self._build_info(),
+            BuildInfo=build_info(self._host.product),
         )
         self._values.set_value(
             ua.NodeId(ids.Server_ServerStatus), status, ua.VariantType.ExtensionObject, now
@@ -234,62 +233,14 @@ class ServiceHost:
             elif user.role is not actor.role:
                 session.actor = Actor(actor.user, user.role, actor.address)
 
-    def _build_info(self) -> ua.BuildInfo:
-        info = ua.BuildInfo()
-        info.ProductUri = self._host.product.uri
-        info.ManufacturerName = self._host.product.name
-        info.ProductName = self._host.product.name
-        info.SoftwareVersion = self._host.product.version
-        info.BuildNumber = self._host.product.version
-        info.BuildDate = self._started
-        return info
-
     def _describe_server(self) -> None:
-        ids, kinds, now = ua.ObjectIds, ua.VariantType, self._started
-        limits = self._settings.limits
-        entries: list[tuple[int, Any, ua.VariantType]] = [
-            (ids.Server_ServerArray, [self._settings.application_uri], kinds.String),
-            (ids.Server_ServiceLevel, 255, kinds.Byte),
-            (ids.Server_ServerCapabilities_LocaleIdArray, self._languages.locale_ids, kinds.String),
-            (ids.Server_Auditing, False, kinds.Boolean),
-            (ids.Server_ServerStatus_StartTime, now, kinds.DateTime),
-            (ids.Server_ServerStatus_State, int(ua.ServerState.Running), kinds.Int32),
-            (ids.Server_ServerStatus_BuildInfo, self._build_info(), kinds.ExtensionObject),
-            (ids.Server_ServerStatus_BuildInfo_ProductUri, self._host.product.uri, kinds.String),
-            (ids.Server_ServerStatus_BuildInfo_ProductName, self._host.product.name, kinds.String),
-            (ids.Server_ServerStatus_BuildInfo_ManufacturerName, self._host.product.name, kinds.String),
-            (ids.Server_ServerStatus_BuildInfo_SoftwareVersion, self._host.product.version, kinds.String),
-            (ids.Server_ServerStatus_BuildInfo_BuildNumber, self._host.product.version, kinds.String),
-            (ids.Server_ServerStatus_BuildInfo_BuildDate, now, kinds.DateTime),
-            (ids.Server_ServerCapabilities_MaxBrowseContinuationPoints, MAX_BROWSE_POINTS, kinds.UInt16),
-            (
-                ids.Server_ServerCapabilities_MaxHistoryContinuationPoints,
-                MAX_HISTORY_POINTS,
-                kinds.UInt16,
-            ),
-            (ids.Server_ServerCapabilities_MaxQueryContinuationPoints, 0, kinds.UInt16),
-            (ids.Server_ServerCapabilities_MaxSessions, limits.sessions, kinds.UInt32),
-            (ids.Server_ServerCapabilities_MaxSubscriptions, limits.subscriptions, kinds.UInt32),
-            (
-                ids.Server_ServerCapabilities_MinSupportedSampleRate,
-                limits.publishing_interval_s * 1e3,
-                kinds.Double,
-            ),
-            (
-                ids.Server_ServerCapabilities_OperationLimits_MaxNodesPerHistoryReadData,
-                MAX_NODES_PER_READ,
-                kinds.UInt32,
-            ),
-            (ids.Server_ServerCapabilities_OperationLimits_MaxNodesPerRead, MAX_OPERATIONS, kinds.UInt32),
-            (ids.HistoryServerCapabilities_AccessHistoryDataCapability, True, kinds.Boolean),
-            (ids.HistoryServerCapabilities_AccessHistoryEventsCapability, True, kinds.Boolean),
-            (ids.HistoryServerCapabilities_MaxReturnDataValues, VALUES_PER_PAGE, kinds.UInt32),
-            (ids.HistoryServerCapabilities_MaxReturnEventValues, VALUES_PER_PAGE, kinds.UInt32),
-        ]
-        for number, value, kind in entries:
+        described = server_description(
+            self._settings, self._host.product, self._languages.locale_ids, self._started
+        )
+        for number, value, kind in described:
             node = ua.NodeId(number)
             if node in self._space:
-                self._values.set_value(node, value, kind, now)
+                self._values.set_value(node, value, kind, self._started)
 
 
 def aggregate_functions() -> list[ua.NodeId]:

@@ -258,6 +258,29 @@ async def test_only_changes_are_told() -> None:
         assert changes.queue.empty()
 
 
+async def test_the_server_tells_the_limits_that_hold() -> None:
+    """They are those of docs/how-to/scada.md; a client plans its subscriptions by them (Part 5, 6.3.2)."""
+    limits = {
+        "MaxSessions": 100,
+        "MaxSubscriptions": 500,
+        "MaxSubscriptionsPerSession": 20,
+        "MaxMonitoredItems": 10_000,
+        "MaxMonitoredItemsPerSubscription": 2_000,
+        "MaxMonitoredItemsQueueSize": 10_000,
+        "ServerProfileArray": [],
+    }
+    async with site() as here, await here.client() as client:
+        told = {
+            name: await client.get_node(
+                getattr(ua.ObjectIds, f"Server_ServerCapabilities_{name}")
+            ).read_value()
+            for name in limits
+        }
+        assert told == limits
+        build = await client.get_node(ua.ObjectIds.Server_ServerStatus_BuildInfo).read_value()
+        assert build.BuildDate == ua.get_win_epoch(), "not when the server was started"
+
+
 async def test_a_deadband_that_cannot_be_is_refused() -> None:
     """OPC UA Part 4, 7.22.2 knows types 0, 1 and 2; Part 8, 7.2 wants 0 to 100 % of an EURange."""
     asked = {
