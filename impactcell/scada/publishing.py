@@ -68,11 +68,12 @@ class CellValues:
             self._write(quantity.path, value, quality, time, now)
 
     def module(self, state: ModuleStatus, time_ns: int) -> None:
-        """Write the state of the link."""
+        """Write the state of the link; what it does not give while it is lost has no communication."""
         time, now = moment(time_ns), datetime.now(UTC)
+        missing = BAD if state.connected else NO_COMMUNICATION
         for quantity in MODULE:
             value, quality = quantity.read(state)
-            self._write(quantity.path, value, quality, time, now)
+            self._write(quantity.path, value, quality, time, now, missing)
 
     def lost(self, time_ns: int) -> None:
         """No communication: every figure of a cycle becomes Bad and keeps its last value."""
@@ -90,12 +91,20 @@ class CellValues:
         for path in self._seen & BY_PATH.keys():
             self._variables[path][0].set_status(given if path in self._given else missing, time)
 
-    def _write(self, path: str, value: Value, quality: Quality, time: datetime, now: datetime) -> None:
+    def _write(
+        self,
+        path: str,
+        value: Value,
+        quality: Quality,
+        time: datetime,
+        now: datetime,
+        missing: ua.StatusCode = BAD,
+    ) -> None:
         variable, kind, is_array = self._variables[path]
         if quality is Quality.BAD or (isinstance(value, float) and math.isnan(value)):
             # A Bad value is the last one that could be believed; there is none before the first.
             self._given.discard(path)
-            status = BAD if path in self._seen else WAITING
+            status = missing if path in self._seen else WAITING
             variable.write(ua.DataValue(variable.data.Value, status, time, now))
             return
         self._seen.add(path)

@@ -195,6 +195,10 @@ async def test_status_value_and_time() -> None:
         here.server.module(CELL, ModuleStatus(connected=False, received=5, missed=1), time.time_ns())
         assert (await _read(here, client, "Module/Connected")).Value.Value is False
         assert (await _read(here, client, "Module/RoundTripTime")).StatusCode.is_bad()
+        here.server.module(CELL, ModuleStatus(connected=True, round_trip_s=0.003), time.time_ns())
+        here.server.module(CELL, ModuleStatus(connected=False), time.time_ns())
+        trip = await _read(here, client, "Module/RoundTripTime")
+        assert (trip.StatusCode.value, trip.Value.Value) == (codes.BadNoCommunication, pytest.approx(3.0))
         here.server.module(
             CELL, ModuleStatus(connected=True, received=5, missed=1, round_trip_s=0.002), time.time_ns()
         )
