@@ -47,8 +47,8 @@ class Acknowledgement:
         Parameters
         ----------
         status : StatusBlock
-            As it was read last. Without `acknowledge_session` it says whether the cycle is of the module's
-            present life: in another one it would acknowledge cycles that nobody has.
+            As it was read last. It says whether the cycle is of the module's present life: in another one it
+            would acknowledge cycles that nobody has. `acknowledge_session` tells of a start since.
 
         Raises
         ------
@@ -58,11 +58,11 @@ class Acknowledgement:
         cycle_id, registers = self.durable, self._client.registers
         if cycle_id is None or cycle_id == self._told or _REGISTER not in registers:
             return
+        if status.session != cycle_id.session or is_after(cycle_id.cycle, status.cycle_counter):
+            return
         values = {_REGISTER: self._numbers.shown(cycle_id.cycle)}
         if "acknowledge_session" in registers:
             values["acknowledge_session"] = cycle_id.session
-        elif status.session != cycle_id.session or is_after(cycle_id.cycle, status.cycle_counter):
-            return
         if asyncio.get_running_loop().time() < self._not_before_s:
             return
         try:

@@ -127,13 +127,17 @@ class ModuleAcquisition:
         self._shown = await self._status_reader.read()
         return self._numbers.status(self._shown, self._taken.last)
 
-    async def acknowledge(self, cycle_id: CycleId) -> None:
-        """Tell the module that the cycle `cycle_id` and all before it are durable.
+    def note_durable(self, cycle_id: CycleId | None) -> None:
+        """Have the module told, from the next poll on, that this cycle and all before it are durable.
 
         Without a connection it is told as soon as there is one, if it has not been started anew meanwhile; a
         module without the registers is not told.
         """
         self._acknowledgement.durable = cycle_id
+
+    async def acknowledge(self, cycle_id: CycleId | None) -> None:
+        """Do what `note_durable` does, and tell a module that is connected at once."""
+        self.note_durable(cycle_id)
         status = self.status_block
         if self._ready.is_set() and status is not None:
             with contextlib.suppress(FieldbusError):  # it is repeated by the next poll
@@ -287,13 +291,8 @@ class ModuleAcquisition:
             doubt = "" if tells else _NO_SESSION
             self._log.warning(
                 "%d before it %s lost: the module %s %s%s",
-                received.missed,
-                are,
-                why,
-                them,
-                doubt,
-                cycle=cycle,
-            )
+                received.missed, are, why, them, doubt, cycle=cycle,
+            )  # fmt: skip
         self._counted_on = self._connections
         for fault in received.faults:
             said = fault.removeprefix(f"{self.cell}: cycle {cycle}").lstrip(": ")

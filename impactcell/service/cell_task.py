@@ -193,6 +193,7 @@ class CellTask:
 
     async def _acquire(self) -> None:
         await self.worker.warm_up()
+        self._module.note_durable(self.worker.durable)
         async with contextlib.aclosing(
             self._module.captures(
                 self.worker.last,
@@ -213,8 +214,8 @@ class CellTask:
             restarted=received.restarted,
         )
         if task is not None:
-            await self.worker.run(partial(task.update_friction, result.step_result.snapshot))
-        snapshot, notes = result.step_result.snapshot, result.step_result.notes
+            await self.worker.run(partial(task.update_friction, result.snapshot))
+        snapshot, notes = result.snapshot, result.notes
         self._conditions.update(notes, capture.cycle)
         self._last_cycle_s, self._stale = time.monotonic(), False
         self._publisher.publish(snapshot, capture)
@@ -225,8 +226,7 @@ class CellTask:
             plus_minus(mu_s.value, mu_s.std, ".4f"), mu_s.quality.name.lower(), snapshot.friction.gap,
             f"{1e3 * late_s:.0f} ms" if capture.time_ns else "some time", cycle=capture.cycle,
         )  # fmt: skip
-        if result.durable is not None:
-            await self._module.acknowledge(result.durable)
+        await self._module.acknowledge(self.worker.durable)
         await self._fault_alarms.check_journal()
         if self._on_snapshot is not None:
             self._on_snapshot(self.cell.name, snapshot)
@@ -281,6 +281,7 @@ class CellTask:
             if late and not self._stale and self._module.status.connected:
                 self._mark_stale()
             await self.worker.retry()
+            self._module.note_durable(self.worker.durable)
             await self._fault_alarms.check_journal()
             if model_time_ns(self.cell) not in (0, self._model_seen_ns):
                 await self.reload()

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 from impactcell import cell as core
@@ -33,14 +33,6 @@ from impactcell.service.restoring import restored_state
 from impactcell.service.warmup import warm_up, warm_up_for_changes
 
 T = TypeVar("T")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CycleResult:
-    """Outcome of one cycle, and the last cycle that is safely stored (None: none yet)."""
-
-    step_result: StepResult
-    durable: CycleId | None
 
 
 class CellWorker:
@@ -98,8 +90,9 @@ class CellWorker:
 
     @property
     def durable(self) -> CycleId | None:
-        """The last cycle that is safely stored."""
-        return self._journal_writer.durable
+        """The last cycle that is safely stored, None: none yet; without a journal the last one taken in."""
+        writer = self._journal_writer
+        return self.last if writer.journal is None else writer.durable
 
     @property
     def lost(self) -> int:
@@ -151,7 +144,7 @@ class CellWorker:
         faults: tuple[str, ...] = (),
         *,
         restarted: bool = False,
-    ) -> CycleResult:
+    ) -> StepResult:
         """Take one cycle through the pipeline and store it."""
 
         def step() -> StepResult:
@@ -244,18 +237,17 @@ class CellWorker:
             self._record(fitted)
         self._state = fitted
 
-    def _process(self, capture: Capture, step: Callable[[], StepResult]) -> CycleResult:
+    def _process(self, capture: Capture, step: Callable[[], StepResult]) -> StepResult:
         step_result = step()
         state, snapshot = step_result.state, step_result.snapshot
         last = CycleId(capture.session, capture.cycle)
         is_kept = self._journal_writer.journal is not None
         blob = self._blob(state, snapshot, last) if is_kept else b""
         self.last, self._state, self._snapshot = last, state, snapshot
-        if not is_kept:
-            return CycleResult(step_result, last)
-        changed = step_result.changed
-        self._journal_writer.cycle(last, lambda journal: journal.append(capture, snapshot, blob, changed))
-        return CycleResult(step_result, self.durable)
+        if is_kept:
+            changed = step_result.changed
+            self._journal_writer.cycle(last, lambda journal: journal.append(capture, snapshot, blob, changed))
+        return step_result
 
     def _maintain(self, time_ns: int) -> None:
         try:

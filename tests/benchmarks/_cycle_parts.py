@@ -105,8 +105,8 @@ async def cycles(file: Path, number: int) -> list[dict[str, float]]:
             )
             spent: dict[str, float] = defaultdict(float)
             with timed(spent):
-                cycle_result = running.worker._process(capture, PositioningState(), None, ())
-                server.publish(cell.name, cycle_result.step_result.snapshot)
+                step_result = running.worker._process(capture, PositioningState(), None, ())
+                server.publish(cell.name, step_result.snapshot)
                 for alarm in running.worker.alarms:
                     server.alarm(cell.name, alarm)
                 server.module(

@@ -74,6 +74,26 @@ async def test_an_acknowledgement_that_comes_after_a_start_of_the_module_was_see
         assert device.acknowledged == []
 
 
+async def test_a_counter_that_was_set_back_in_the_same_session_is_not_told_of_what_is_ahead_of_it(
+    fpga: RegisterMap,
+) -> None:
+    """`acknowledge_session` does not help where the module shows the same session in each of its lives."""
+    device = ScriptedDevice(fpga, session=3)
+    make(device, 5)
+    async with running(fpga, device) as (server, module, receptions):
+        received = await take(receptions, 5)
+        await module.acknowledge(received[-1].cycle_id)
+        assert device.acknowledged == [(3, 5)]
+        device.start(session=3)
+        server.drop_clients()
+        make_of(device, 4)
+        coming = asyncio.ensure_future(take(receptions, 1))
+        await asyncio.sleep(POLLED_S)
+        assert device.acknowledged == [(3, 5)]
+        coming.cancel()
+        await asyncio.gather(coming, return_exceptions=True)
+
+
 class Refusing(ScriptedDevice):
     """Refuses the acknowledgement, or closes the connection for it, as long as it is told to."""
 

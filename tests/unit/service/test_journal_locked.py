@@ -32,7 +32,7 @@ async def test_what_comes_while_another_program_writes_is_stored_afterwards(
         other.execute("BEGIN IMMEDIATE")
         for cycle in (1, 2, 3):
             shown = await worker.process(make_capture(cycle), PositioningState(), None)
-            assert (shown.step_result.snapshot.cycle, shown.durable) == (cycle, None)
+            assert (shown.snapshot.cycle, worker.durable) == (cycle, None)
         assert worker.journal_fault == (
             f"{path}: another program has it open for writing (database is locked); close it there"
         )

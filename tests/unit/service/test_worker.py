@@ -42,7 +42,8 @@ def cycles(path: Path) -> list[int]:
 
 
 async def process(worker: CellWorker, capture: Capture) -> CycleId | None:
-    return (await worker.process(capture, PositioningState(), None)).durable
+    await worker.process(capture, PositioningState(), None)
+    return worker.durable
 
 
 async def test_an_entry_that_can_never_be_stored_blocks_nothing(
@@ -176,8 +177,8 @@ async def test_a_capture_that_cannot_be_computed_counts_as_unreadable(
 
     monkeypatch.setattr(core, "step", fails_with_samples)
     processed = await worker.process(make_capture(1), PositioningState(), None)
-    assert processed.step_result.snapshot.cycle == 1
-    assert processed.step_result.snapshot.friction.mu_s.quality is Quality.BAD
+    assert processed.snapshot.cycle == 1
+    assert processed.snapshot.friction.mu_s.quality is Quality.BAD
     assert worker.last == CycleId(1, 1)
     await worker.close()
 
@@ -197,7 +198,7 @@ async def test_odd_captures_are_survived(design: core.CellDesign) -> None:
         start=1,
     ):
         processed = await worker.process(replace(odd, cycle=cycle), PositioningState(), None)
-        assert processed.step_result.snapshot.cycle == cycle
+        assert processed.snapshot.cycle == cycle
     await worker.close()
 
 
