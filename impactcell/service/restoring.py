@@ -5,10 +5,12 @@ from dataclasses import replace
 
 from impactcell import cell as core
 from impactcell.cell import CellDesign
+from impactcell.cell.model_change import model_digest
 from impactcell.errors import JournalDamagedError
 from impactcell.journal.database import unreadable_state
 from impactcell.journal.store import Journal
 from impactcell.journal.stored_forms import StoredState, unpack_state
+from impactcell.positioning.model_hypotheses import with_model_accepted
 from impactcell.process.cell_logger import CellLogger
 from impactcell.serialization.tree import Unknown
 from impactcell.service.journal_writer import JournalWriter
@@ -20,7 +22,8 @@ def restored_state(writer: JournalWriter, design: CellDesign, unknown: Unknown) 
     """Read the state that the journal holds; a new one where there is none.
 
     Its `last` is the cycle to go on behind: the last one that the state has taken in or, where a state of
-    before has to do, the last one of the journal, so that no cycle is journalled twice.
+    before has to do, the last one of the journal, so that no cycle is journalled twice. What taps said that
+    the model lacks ends where another model is in service now, as it does on a reload.
 
     Parameters
     ----------
@@ -45,6 +48,8 @@ def restored_state(writer: JournalWriter, design: CellDesign, unknown: Unknown) 
     log = CellLogger(_log, design.name)
     for alarms in unknown.values():
         log.warning("the journal has alarms of another version; they are kept: %s", ", ".join(alarms))
+    if stored.planner is not None and stored.cell.model_digest not in ("", model_digest(design.model)):
+        stored = replace(stored, planner=with_model_accepted(stored.planner))
     last = stored.last if is_newest else writer.durable
     return replace(stored, last=last or writer.durable or stored.last)
 

@@ -89,6 +89,28 @@ async def test_a_model_that_is_accepted_clears_what_taps_said_of_the_one_before(
     await worker.close()
 
 
+@pytest.mark.parametrize("accepted", [True, False], ids=["another model", "the same model"])
+async def test_a_model_that_was_accepted_while_the_service_did_not_run_clears_it_too(
+    tmp_path: Path, cell: CellConfig, *, accepted: bool
+) -> None:
+    """ModelGap went on asking for the workflow whose model was in service."""
+    design = cell_design(cell)
+    worker = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
+    learned = task_of(cell, design, worker).belief
+    worker.belief = join(parts_of(learned), np.array([1e-6, 1e-6, 1e-6, 1.0]), replace(learned, taps=9))
+    await worker.process(make_capture(1), PositioningState(), None)
+    await worker.close()
+    if accepted:
+        plant = design.model.plant
+        plant = replace(plant, stiffness_n_per_m=1.01 * plant.stiffness_n_per_m)
+        design = replace(design, model=replace(design.model, plant=plant))
+    for _ in range(2):  # no cycle comes in the first of the two starts
+        worker = CellWorker(design, Journal(tmp_path / "j", cell.name), Retention())
+        task = task_of(cell, design, worker)
+        assert (task.belief.taps, task.state.predictions.lacking) == (9, not accepted)
+        await worker.close()
+
+
 async def test_a_shift_of_the_batch_before_a_restart_is_no_news_after_it(
     tmp_path: Path, cell: CellConfig
 ) -> None:
