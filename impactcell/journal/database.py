@@ -19,6 +19,7 @@ from impactcell.errors import (
     JournalUnavailableError,
 )
 from impactcell.journal.checksums import row_crc
+from impactcell.journal.presence import check_writable
 from impactcell.journal.schema import APPLICATION_ID, COLUMNS, FORMAT, OLDEST, TABLES, UPGRADES
 
 WAY_OUT: Final = "run the version that wrote it, or name another file to begin anew"
@@ -130,9 +131,10 @@ def open_database(
     JournalError
         It is damaged.
     """
-    if not read_only:
-        check_header(path)
     with errors(path):
+        if not read_only:
+            check_header(path)
+            check_writable(path)
         database = sqlite3.connect(
             f"{path.absolute().as_uri()}?{_read_only_query(path) if read_only else 'mode=rwc'}",
             uri=True,

@@ -1,9 +1,10 @@
-"""Whether the files that a journal writes are still those at its path.
+"""Whether the files that a journal writes may be written, and are still those at its path.
 
 A file that is removed or replaced while it is open can be written on, and nobody will ever read it: no error
 comes from the system. So the journal looks, after each transaction.
 """
 
+import errno
 import os
 from pathlib import Path
 from typing import Final
@@ -14,6 +15,20 @@ _SUFFIXES: Final = ("", "-wal")
 """The database, and the log that commits go to."""
 
 Identity = tuple[int, int]
+
+
+def check_writable(path: Path) -> None:
+    """See that a journal may be written: SQLite opens it all the same, and would not notice when it may be.
+
+    Raises
+    ------
+    PermissionError
+        If the file, or one that SQLite keeps beside it, may only be read.
+    """
+    for suffix in (*_SUFFIXES, "-shm"):
+        file = path.with_name(path.name + suffix)
+        if file.exists() and not os.access(file, os.W_OK):
+            raise PermissionError(errno.EACCES, f"{file.name}: {os.strerror(errno.EACCES)}")
 
 
 class FilePresence:

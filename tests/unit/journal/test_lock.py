@@ -132,3 +132,26 @@ def test_a_directory_that_is_not_there_is_not_called_a_full_disk(tmp_path: Path)
     with pytest.raises(JournalUnavailableError) as told:
         Journal(tmp_path / "nowhere" / "j", "c")
     assert not isinstance(told.value, JournalFullError)
+
+
+@pytest.mark.parametrize("suffix", ["", "-wal", "-shm"])
+def test_a_file_that_may_only_be_read_is_not_opened_for_writing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
+) -> None:
+    """SQLite would open it, as of another owner, and no cycle be stored once its owner was set right."""
+    path, kept = tmp_path / "j", []
+    Journal(path, "c").close()
+    read_only = path.with_name(path.name + suffix)
+    read_only.touch()
+    access = os.access
+
+    def may(file: Path, mode: int) -> bool:  # who runs this may be root, who may do everything
+        return access(file, mode) and not (file == read_only and mode & os.W_OK and not kept)
+
+    monkeypatch.setattr(os, "access", may)
+    with pytest.raises(JournalUnavailableError) as told:
+        Journal(path, "c")
+    reason = f"{read_only.name}: Permission denied"
+    assert str(told.value) == f"{path}: cannot be used now ({reason}); check its disk, directory and owner"
+    kept.append("its owner was set right")
+    Journal(path, "c").close()
