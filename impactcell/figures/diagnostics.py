@@ -4,6 +4,7 @@ The paper's text, not its images, was at hand: each figure shows one of its thre
 cycles whose truth is known and drawn beside what the tracker says.
 """
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -185,7 +186,7 @@ def _tracked(
 
 
 def _slide(rng: np.random.Generator, cycle: int, bump: float) -> Capture:
-    """Slide from 0.09 m/s over a given friction: speed from the energy, time from the speed, 10 kHz."""
+    """Slide freely from 0.09 m/s over a given friction: speed from energy, time from speed, 10 kHz."""
     x = np.linspace(0.0, 4e-3, 40001)
     level, tilt = 0.01 * rng.normal(), 0.005 * rng.normal()
     friction = 1.0 + level + tilt * (x / 1e-3 - 1.0) + 0.03 * np.sin(2.0 * np.pi * x / 1.3e-3)
@@ -198,4 +199,4 @@ def _slide(rng: np.random.Generator, cycle: int, bump: float) -> Capture:
     time = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(x) / (speed[1:] + speed[:-1]))])
     t = np.arange(0.0, time[-1] + 0.02, 1e-4)
     position = np.interp(t, time, x) + 0.42e-6 * rng.normal(size=len(t))
-    return Capture(cycle, 0.05, 18.9, None, Channel(t, position, 0.42e-6))
+    return Capture(cycle, math.nan, 18.9, None, Channel(t, position, 0.42e-6))
