@@ -53,6 +53,10 @@ def _rate_range(ranges: Ranges) -> Range:
     return -ranges.friction / PER_1000.per_si, ranges.friction / PER_1000.per_si
 
 
+def _rate_std_range(ranges: Ranges) -> Range:
+    return 0.0, ranges.friction / PER_1000.per_si
+
+
 def _velocity_range(ranges: Ranges) -> Range:
     return 0.0, ranges.velocity_m_s
 
@@ -120,6 +124,19 @@ CYCLE: Final[tuple[Quantity[Snapshot], ...]] = (
     _Q("Friction/CycleNumber", 6025, "Number of the last cycle, as the module counts.",
        ("Cycle", "Zyklus"),
        lambda s: s.cycle, data_type=DataType.UINT32),
+    _Q("Friction/StaticFrictionByForceStdDev", 6112, "One standard deviation of StaticFrictionByForce.",
+       ("Standard deviation of µs from the force", "Standardabweichung von µs aus der Kraft"),
+       lambda s: s.friction.by_force.std, lambda s: s.friction.by_force.quality, ONE, _friction_range,
+       column="by_force_std", quality_column="by_force_quality"),
+    _Q("Friction/StaticFrictionByDistanceStdDev", 6115,
+       "One standard deviation of StaticFrictionByDistance.",
+       ("Standard deviation of µs from the distance", "Standardabweichung von µs aus dem Gleitweg"),
+       lambda s: s.friction.by_distance.std, lambda s: s.friction.by_distance.quality, ONE, _friction_range,
+       column="by_distance_std", quality_column="by_distance_quality"),
+    _Q("Friction/KineticFrictionStdDev", 6118, "One standard deviation of KineticFriction.",
+       ("Standard deviation of µk", "Standardabweichung von µk"),
+       lambda s: s.friction.mu_k.std, lambda s: s.friction.mu_k.quality, ONE, _friction_range,
+       column="mu_k_std", quality_column="mu_k_quality", has_history=True),
 
     _Q("Wear/Level", 6026, "Static friction at the reference batch, filtered over cycles.",
        ("Level at the reference batch", "Niveau bei der Bezugscharge"),
@@ -151,6 +168,9 @@ CYCLE: Final[tuple[Quantity[Snapshot], ...]] = (
        ("Level: error that all cycles share (95 %)", "Niveau: gemeinsamer Fehler aller Zyklen (95 %)"),
        lambda s: s.wear.level_common_std, _wear_quality, ONE, _friction_range,
        column="wear_level_common_std", quality_column="wear_quality"),
+    _Q("Wear/RatePer1000CyclesStdDev", 6121, "One standard deviation of RatePer1000Cycles.",
+       ("Standard deviation of the change", "Standardabweichung der Änderung"),
+       lambda s: s.wear.rate_std, _wear_quality, PER_1000, _rate_std_range),
 
     _Q("Batch/BatchId", 6047, "Name of the present batch.",
        ("Batch", "Charge"),
@@ -169,6 +189,9 @@ CYCLE: Final[tuple[Quantity[Snapshot], ...]] = (
     _Q("Batch/LastShiftCycle", 6057, "First cycle after the last shift; 0 before the first.",
        ("Last shift at cycle", "Letzter Sprung bei Zyklus"),
        lambda s: s.batch.last_shift_cycle, data_type=DataType.UINT32),
+    _Q("Batch/LastShiftStdDev", 6124, "One standard deviation of LastShift.",
+       ("Standard deviation of the last shift", "Standardabweichung des letzten Sprungs"),
+       lambda s: s.batch.last_shift_std, _batch_quality, ONE, _friction_range),
 
     _Q("Signature/Position", 6058, "Distance slid since loss of contact, on the fixed grid of the cell.",
        ("Distance slid", "Gleitweg"),

@@ -119,12 +119,14 @@ def _facts(last: Snapshot, *, wide: bool, rows: int | None = None) -> Table:
     return facts
 
 
-def _plus_minus(value: float, std: float) -> str:
+def _plus_minus(value: float, std: float, sign: str = "") -> str:
     """Show four decimals, or as many as the first digit of the standard deviation needs."""
     if math.isnan(value):
         return "none"
     decimals = 4 if not 0.0 < std < 1e-4 else min(-math.floor(math.log10(std)), 7)
-    return plus_minus(value, std, f".{decimals}f") if math.isfinite(std) else f"{value:.4f}"
+    if not math.isfinite(std):
+        return f"{value:{sign}.4f}"
+    return plus_minus(value, std, f"{sign}.{decimals}f", f".{decimals}f")
 
 
 def _value(coefficient: Coefficient) -> str:
@@ -148,7 +150,8 @@ def _level(snapshot: Snapshot) -> Text:
     wear = snapshot.wear
     text = Text(_plus_minus(wear.level, wear.level_std), style=QUALITY_STYLE[wear.quality])
     if math.isfinite(wear.rate_per_cycle):
-        text.append(f"  {wear.rate_per_cycle * 1000:+.4f} per 1000 cycles", style="dim")
+        rate = _plus_minus(wear.rate_per_cycle * 1000, wear.rate_std * 1000, "+")
+        text.append(f"  {rate} per 1000 cycles", style="dim")
     return text
 
 
@@ -174,7 +177,8 @@ def _batch(snapshot: Snapshot) -> Text:
         f"  offset {_plus_minus(batch.offset, batch.offset_std)}", style="dim"
     )
     if batch.last_shift_cycle:
-        text.append(f", shifted {batch.last_shift:+.4f} at cycle {batch.last_shift_cycle}", style="dim")
+        shift = _plus_minus(batch.last_shift, batch.last_shift_std, "+")
+        text.append(f", shifted {shift} at cycle {batch.last_shift_cycle}", style="dim")
     return text
 
 

@@ -82,14 +82,23 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
         "Leer: frühere Zustände einer Meldung werden nicht getrennt gehalten."
     ),
     "Number of the last cycle, as the module counts.": "Nummer des letzten Zyklus, wie das Modul zählt.",
+    "One standard deviation of KineticFriction.": "Eine Standardabweichung der Gleitreibung.",
+    "One standard deviation of LastShift.": "Eine Standardabweichung des letzten Sprungs.",
     "One standard deviation of Level.": "Eine Standardabweichung des Niveaus.",
     "One standard deviation of what may be wrong in Level alike in all cycles, beside LevelStdDev.": (
         "Eine Standardabweichung dessen, was am Niveau in allen Zyklen gleich falsch sein kann, "
         "neben LevelStdDev."
     ),
     "One standard deviation of Offset.": "Eine Standardabweichung des Abstands.",
+    "One standard deviation of RatePer1000Cycles.": "Eine Standardabweichung der Änderung in 1000 Zyklen.",
     "One standard deviation of Size.": "Eine Standardabweichung der Größe.",
     "One standard deviation of StaticFriction.": "Eine Standardabweichung der Haftreibung.",
+    "One standard deviation of StaticFrictionByDistance.": (
+        "Eine Standardabweichung der Haftreibung aus dem Gleitweg."
+    ),
+    "One standard deviation of StaticFrictionByForce.": (
+        "Eine Standardabweichung der Haftreibung aus der Spitzenkraft."
+    ),
     "Present state.": "Jetziger Zustand.",
     "Product code of the manufacturer.": "Produktcode des Herstellers.",
     "Range the value is expected to stay in.": "Bereich, in dem der Wert erwartet wird.",

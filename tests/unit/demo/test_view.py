@@ -74,7 +74,7 @@ ENDPOINT = (
 )
 
 
-@pytest.mark.parametrize(("width", "height"), [(80, 24), (60, 15), (120, 40), (80, 10), (60, 60)])
+@pytest.mark.parametrize(("width", "height"), [(80, 24), (60, 15), (120, 40), (80, 10), (60, 62)])
 def test_many_alarms_push_nothing_out(width: int, height: int) -> None:
     last = history(30)[-1]
     alarms = tuple(
@@ -97,8 +97,8 @@ def test_many_alarms_push_nothing_out(width: int, height: int) -> None:
     names = [alarm.name for alarm in (*alarms[2:], *alarms[:2])]
     places = [text.find(name) for name in names if name in text]
     assert places == sorted(places)
-    assert "WearLimit cleared, unacknowledged since cycle 21: it said: by" in text or height < 60
-    assert "ModelGap active, unacknowledged since cycle 21: by" in text or height < 60
+    assert "WearLimit cleared, unacknowledged since cycle 21: it said: by" in text or height < 62
+    assert "ModelGap active, unacknowledged since cycle 21: by" in text or height < 62
     told = [place for place, line in enumerate(lines) if "since cycle 21" in line]
     if len(told) < len(alarms):
         assert f"+{len(alarms) - len(told)} more: " in lines[-2] or f"{len(alarms)} alarms: " in lines[-2]
@@ -129,6 +129,15 @@ def test_small_deviations_are_shown_with_the_decimals_that_they_need() -> None:
     last = history(1)[0]
     known = replace(last, friction=replace(last.friction, mu_k=Coefficient(0.1512345, 2e-5, Quality.GOOD)))
     assert "0.15123 ± 0.00004" in drawn([known])
+
+
+def test_what_wear_and_batches_did_is_told_with_what_is_not_sure_of_it() -> None:
+    last = history(1)[0]
+    wear = replace(last.wear, rate_per_cycle=1e-6, rate_std=2e-7)
+    batch = replace(last.batch, last_shift=-0.0255, last_shift_std=0.003, last_shift_cycle=9)
+    text = drawn([replace(last, wear=wear, batch=batch)], 160)
+    assert "+0.0010 ± 0.0004 per 1000 cycles" in text
+    assert "shifted -0.0255 ± 0.0060 at cycle 9" in text
 
 
 def test_a_positioning_cell_shows_its_task() -> None:

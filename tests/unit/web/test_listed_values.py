@@ -1,11 +1,12 @@
 """What the page shows of a cycle is the table of published quantities, whatever stands in it."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
 from impactcell.quantities import CYCLE, MODULE
-from impactcell.records import ModuleStatus
+from impactcell.records import Coefficient, ModuleStatus, Quality
 from impactcell.web.cell_view import CellView
 from impactcell.web.interface import CellNews
 from impactcell.web.listed_values import listed_values
@@ -29,6 +30,37 @@ def test_a_cycle_that_has_not_been_is_no_number() -> None:
     assert forms["Batch/LastShiftCycle"] == "cycle", "0 before the first: a dash"
     assert forms["Module/CyclesMissed"] == "count", "0 is a number"
     assert forms["Wear/CyclesToLimit"] == forms["Wear/CyclesToLimitLow"] == "cycles", "no part of a cycle"
+
+
+@pytest.mark.parametrize(
+    ("path", "std"),
+    [
+        ("Friction/StaticFriction", 0.002),
+        ("Friction/StaticFrictionByForce", 0.003),
+        ("Friction/StaticFrictionByDistance", 0.004),
+        ("Friction/KineticFriction", 0.001),
+        ("Wear/Level", 0.005),
+        ("Wear/RatePer1000Cycles", 0.006),
+        ("Batch/Offset", 0.007),
+        ("Batch/LastShift", 0.008),
+    ],
+)
+def test_a_value_that_is_estimated_has_its_standard_deviation_beside_it(path: str, std: float) -> None:
+    snapshot = make_snapshot(make_capture())
+    friction = replace(
+        snapshot.friction,
+        by_force=Coefficient(0.21, 0.003, Quality.GOOD),
+        by_distance=Coefficient(0.22, 0.004, Quality.GOOD),
+        mu_k=Coefficient(0.15, 0.001, Quality.GOOD),
+    )
+    wear = replace(snapshot.wear, level_std=0.005, rate_std=6e-6)
+    batch = replace(snapshot.batch, offset_std=0.007, last_shift=0.03, last_shift_std=0.008)
+    view = CellView("press-1")
+    view.take(CellNews("press-1", replace(snapshot, friction=friction, wear=wear, batch=batch)))
+    assert json.loads(view.encode("card"))["values"][f"{path}StdDev"] == pytest.approx(std)
+    quantities = {quantity.path: quantity for quantity in CYCLE}
+    assert quantities[f"{path}StdDev"].unit is quantities[path].unit
+    assert quantities[f"{path}StdDev"].has_history == quantities[path].has_history
 
 
 def test_a_card_has_every_value_in_the_unit_of_its_node() -> None:
