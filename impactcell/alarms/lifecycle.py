@@ -33,7 +33,7 @@ class AlarmEvent:
     Attributes
     ----------
     user, comment : str
-        Of a person's action. An empty comment leaves the last one standing, unless that is of somebody else.
+        Of a person's action. An empty comment leaves the last one standing, as its author's.
     message, severity, evidence
         Of an activation; None leaves what is there.
     shelve_ns : int
@@ -96,7 +96,7 @@ def transition(alarm: Alarm, event: AlarmEvent) -> Transition:
         return Transition(alarm)
     is_raised = moved.active and not moved.acknowledged and (alarm.acknowledged or not alarm.active)
     if moved.active and not alarm.active:  # what was said before was said of another activation
-        moved = replace(moved, comment="", user="")
+        moved = replace(moved, comment="", comment_user="", user="")
     moved = _dated(alarm, _described(moved, event), event)
     if is_raised:
         moved = replace(moved, activation=max(event.time_ns, alarm.activation + 1))
@@ -152,8 +152,6 @@ def _dated(before: Alarm, after: Alarm, event: AlarmEvent) -> Alarm:
 
 
 def _described(alarm: Alarm, event: AlarmEvent) -> Alarm:
-    is_said = event.comment or event.user not in ("", alarm.user)
-    comment, user = (event.comment, event.user) if is_said else (alarm.comment, alarm.user)
     return replace(
         alarm,
         cycle=event.cycle,
@@ -162,6 +160,7 @@ def _described(alarm: Alarm, event: AlarmEvent) -> Alarm:
         message_de=alarm.message_de if event.message is None else event.message.german,
         severity=alarm.severity if event.severity is None else event.severity,
         evidence=alarm.evidence if event.evidence is None else event.evidence,
-        comment=comment,
-        user=user,
+        comment=event.comment or alarm.comment,
+        comment_user=event.user if event.comment else alarm.comment_user,
+        user=event.user or alarm.user,
     )

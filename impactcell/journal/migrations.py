@@ -3,8 +3,7 @@
 A field that is renamed gets a row here, its place in the form before (see `Migration`) and its new key;
 nothing else refers to the old name. Format 2 is the first that has a number. Rows may be added to the last
 migration as long as no version that writes its result has been released; the change after that begins a
-migration of its own. A later format than this version knows is refused elsewhere: of what is stored by
-`impactcell.serialization.versioned`, of the file as a whole by `impactcell.journal.database`.
+migration of its own. A later format is refused by `serialization.versioned` and `journal.database`.
 """
 
 import math
@@ -120,9 +119,10 @@ def _state_13(content: dict[str, Tree]) -> dict[str, Tree]:
 
 
 def _alarm_3(content: dict[str, Tree]) -> dict[str, Tree]:
-    """Tell since when an alarm is active, which was kept as its activation; else it is not known."""
+    """Tell since when an alarm is active: its activation. Its comment is of who acted last."""
     since = content["activation"] if content["active"] else 0
-    return {**content, "active_ns": since, "enabled_ns": 0, "comment_ns": 0}
+    said = {"comment_ns": 0, "comment_user": content["user"] if content["comment"] else ""}
+    return {**content, "active_ns": since, "enabled_ns": 0, **said}
 
 
 def _alarm_2(content: dict[str, Tree]) -> dict[str, Tree]:

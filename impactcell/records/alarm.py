@@ -61,9 +61,10 @@ class Alarm:
         first.
     active_ns, enabled_ns, comment_ns : int
         Time at which `active`, `enabled` and `comment` came to be what they are; 0 where it is not known.
-    comment, user : str
-        Who acted last since the alarm became active, and the last comment of that person; empty where
-        somebody else's came before.
+    comment, comment_user : str
+        The last comment since the alarm became active, and whose it is.
+    user : str
+        Who acted last since then, with a comment or without one.
     """
 
     name: str
@@ -87,3 +88,4 @@ class Alarm:
     active_ns: int = 0
     enabled_ns: int = 0
     comment_ns: int = 0
+    comment_user: str = ""

@@ -167,7 +167,7 @@ class Condition:
                 "ConditionName": (alarm.name, ua.VariantType.String),
                 "BranchId": (ua.NodeId(), ua.VariantType.NodeId),
                 "Retain": (is_retained(alarm), ua.VariantType.Boolean),
-                "ClientUserId": (alarm.user, ua.VariantType.String),
+                "ClientUserId": (alarm.comment_user or alarm.user, ua.VariantType.String),
                 "Comment": (ua.LocalizedText(alarm.comment), _LT),
                 "Quality": (GOOD, ua.VariantType.StatusCode),
                 "LastSeverity": (last_severity, ua.VariantType.UInt16),

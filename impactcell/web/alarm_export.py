@@ -10,7 +10,7 @@ from impactcell.records import Alarm
 
 HEADER: Final = (
     *("time_utc", "cell", "condition", "active", "acknowledged", "confirmed", "shelving", "severity"),
-    *("cycle", "message", "user", "comment", "enabled", "suppressed"),
+    *("cycle", "message", "user", "comment", "enabled", "suppressed", "comment_user"),
 )
 FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
 """What a spreadsheet takes for the start of a formula; a text that begins so gets an apostrophe before it."""
@@ -24,7 +24,7 @@ def _row(cell: str, alarm: Alarm) -> tuple[Value, ...]:
         moment.isoformat(timespec="milliseconds").replace("+00:00", "Z"),
         *(cell, alarm.name, int(alarm.active), int(alarm.acknowledged), int(alarm.confirmed)),
         *(alarm.shelving.value, alarm.severity, alarm.cycle, alarm.message, alarm.user, alarm.comment),
-        *(int(alarm.enabled), int(alarm.suppressed)),
+        *(int(alarm.enabled), int(alarm.suppressed), alarm.comment_user),
     )
 
 

@@ -229,6 +229,7 @@ def alarm_content(cell: str, alarm: Alarm) -> dict[str, Any]:
         "cycle": alarm.cycle,
         "time_ms": alarm.time_ns // 1_000_000,
         "comment": alarm.comment,
+        "comment_user": alarm.comment_user,
         "user": alarm.user,
         "event_id": event_id(cell, alarm).hex(),
         "evidence": {

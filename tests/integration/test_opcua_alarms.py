@@ -230,6 +230,24 @@ async def test_the_history_tells_the_same_event_ids() -> None:
         assert [event.EventId for event in past] == live
 
 
+async def test_a_comment_stands_as_its_authors_while_others_act_without_one() -> None:
+    """OPC 10000-9: a NULL comment changes none (5.7.3), ClientUserId is whose the last one is (5.5.2)."""
+    async with site() as here, await here.client("operator") as ann, await here.client("engineer") as bob:
+        events = await listening(here, ann)
+        here.raise_alarm()
+        raised = (await events.next()).EventId
+        assert await act(here, bob, "Acknowledge", raised, "") == 0
+        silent = await events.next()
+        assert (silent.Comment.Text or "", silent.ClientUserId) == ("", "engineer"), "nobody else spoke"
+        assert await act(here, ann, "AddComment", raised, "seen") == 0
+        noted = await events.next()
+        assert await act(here, bob, "Confirm", raised, "") == 0
+        confirmed = await events.next()
+        for event in (noted, confirmed):
+            assert (event.Comment.Text, event.ClientUserId) == ("seen", "operator")
+        assert getattr(confirmed, "Comment/SourceTimestamp") == noted.Time
+
+
 async def past(here: Site, client: Client, alarm: Alarm) -> object:
     """The event of the history that tells a transition."""
     here.history.transitions[CELL] = [alarm]

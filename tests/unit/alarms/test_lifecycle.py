@@ -221,21 +221,23 @@ def test_comment_and_description_travel_with_the_event():
 
 
 @pytest.mark.parametrize(
-    ("kind", "user", "said"),
+    ("kind", "user", "acted"),
     [
-        (EventKind.ACKNOWLEDGE, "ann", ("seen", "ann")),
-        (EventKind.ACKNOWLEDGE, "bob", ("", "bob")),
-        (EventKind.SHELVE_TIMED, "bob", ("", "bob")),
-        (EventKind.CLEAR, "", ("seen", "ann")),
+        (EventKind.ACKNOWLEDGE, "ann", "ann"),
+        (EventKind.ACKNOWLEDGE, "bob", "bob"),
+        (EventKind.SHELVE_TIMED, "bob", "bob"),
+        (EventKind.CLEAR, "", "ann"),
     ],
 )
-def test_nobody_is_told_to_have_said_what_somebody_else_said(
-    kind: EventKind, user: str, said: tuple[str, str]
-):
+def test_nobody_is_told_to_have_said_what_somebody_else_said(kind: EventKind, user: str, acted: str):
+    """OPC UA Part 9, 5.7.3: without a comment the one that stands does, and it is its author's (5.5.2)."""
     raised = alarm(Annunciation.UNACKNOWLEDGED)
     noted = transition(raised, AlarmEvent(EventKind.COMMENT, 9, 10, user="ann", comment="seen")).alarm
     done = transition(noted, AlarmEvent(kind, 11, 12, user=user, shelve_ns=MINUTE)).alarm
-    assert (done.comment, done.user) == said
+    assert (done.comment, done.comment_user, done.user) == ("seen", "ann", acted)
+    other = AlarmEvent(EventKind.COMMENT, 13, 14, user="bob", comment="gone")
+    done = transition(done, other).alarm
+    assert (done.comment, done.comment_user, done.user) == ("gone", "bob", "bob")
 
 
 def test_what_was_said_of_an_activation_does_not_stand_on_the_next():
@@ -247,7 +249,7 @@ def test_what_was_said_of_an_activation_does_not_stand_on_the_next():
     gone = transition(noted, AlarmEvent(EventKind.CLEAR, 11, 12)).alarm
     assert (gone.comment, gone.user) == ("seen", "ann")
     again = transition(gone, AlarmEvent(EventKind.ACTIVATE, 13, 14)).alarm
-    assert (again.comment, again.user) == ("", "")
+    assert (again.comment, again.comment_user, again.user) == ("", "", "")
 
 
 def test_realarm_calls_again():

@@ -119,18 +119,22 @@ def test_a_transition_of_an_alarm_that_is_not_known_is_left_out_and_of_a_later_f
 
 
 @pytest.mark.parametrize(("active", "since"), [(True, 41), (False, 0)])
-def test_an_alarm_of_format_2_is_active_since_its_activation(initial: CellState, active: bool, since: int):
+def test_an_alarm_of_format_2_is_active_since_its_activation_and_its_comment_of_its_user(
+    initial: CellState, active: bool, since: int
+):
     """Nothing else of it was kept: it had moved on at 43."""
-    stored = load_tree(ALARM.dumps(Alarm("WearLimit", active=active, time_ns=43, activation=41)))["content"]
-    for later in ("active_ns", "enabled_ns", "comment_ns"):
+    stored = load_tree(
+        ALARM.dumps(Alarm("WearLimit", active=active, time_ns=43, activation=41, comment="seen", user="ann"))
+    )["content"]
+    for later in ("active_ns", "enabled_ns", "comment_ns", "comment_user"):
         del stored[later]
     read = load_alarm(dump_tree({"format": 2, "content": stored}))
     assert read is not None
-    assert (read.active_ns, read.enabled_ns, read.comment_ns) == (since, 0, 0)
+    assert (read.active_ns, read.enabled_ns, read.comment_ns, read.comment_user) == (since, 0, 0, "ann")
     state = unpack_tree(pack_state(StoredState(initial)))
     for alarm in state["content"]["cell"]["alarms"]["alarms"].values():
         alarm |= {"active": active, "activation": 41}
-        for later in ("active_ns", "enabled_ns", "comment_ns"):
+        for later in ("active_ns", "enabled_ns", "comment_ns", "comment_user"):
             del alarm[later]
     cell = unpack_state(pack_tree({**state, "format": 12}), initial).cell
     assert {alarm.active_ns for alarm in cell.alarms.alarms} == {since}

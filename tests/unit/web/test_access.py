@@ -454,7 +454,9 @@ async def test_a_script_in_a_name_or_a_comment_is_text(tmp_path: Path) -> None:
     page = make_page(tmp_path)
     users = read_users(page.users)
     write_users(page.users, users | {SCRIPT: User(SCRIPT, Role.ENGINEER, password="x")})
-    await put(page, CellNews(CELL, alarms=(raised(SCRIPT, comment=SCRIPT, user=SCRIPT),)))
+    await put(
+        page, CellNews(CELL, alarms=(raised(SCRIPT, comment=SCRIPT, user=SCRIPT, comment_user=SCRIPT),))
+    )
     async with page.client() as client:
         assert SCRIPT not in (await log_in(client, SCRIPT, "wrong", next=SCRIPT)).text
         await log_in(client, SCRIPT, PASSWORD)

@@ -228,9 +228,9 @@ async def test_the_history_is_shown_and_can_be_taken_home(tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", '=HYPERLINK("http://x")'])
 def test_no_text_becomes_a_formula(text: str) -> None:
-    history = [(CELL, raised(text, comment=text, user=text))]
+    history = [(CELL, raised(text, comment=text, user=text, comment_user=text))]
     [row] = list(csv.DictReader(io.StringIO(to_csv(history).decode("utf-8-sig"))))
-    assert row["message"] == row["comment"] == row["user"] == f"'{text}"
+    assert row["message"] == row["comment"] == row["user"] == row["comment_user"] == f"'{text}"
     sheet = openpyxl.load_workbook(io.BytesIO(to_xlsx(history))).active
     cells = {cell.value: cell.data_type for cell in sheet[2]}
     assert all(kind != "f" for kind in cells.values())
