@@ -173,10 +173,13 @@ def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json:
     except ImpactCellError as error:
         refusal = error
     changes = [
-        {"parameter": name, "before": old, "after": new}
+        {"parameter": name, "before": old, "after": new, "ci95": _interval(after, name)}
         for name, old, new in _changes(dict(_parameters(before)), dict(_parameters(after)))
     ]
-    rows = [f"  {c['parameter']}: {_text(c['before'])} -> {_text(c['after'])}" for c in changes]
+    rows = [
+        f"  {c['parameter']}: {_text(c['before'])} -> {_text(c['after'])}{_interval_text(c['ci95'])}"
+        for c in changes
+    ]
     if own_taps is not None:
         rows.append(own_taps.sentence)
     sharing = cells_sharing(cell_config)
@@ -220,6 +223,17 @@ def _changes(before: dict[str, Any], after: dict[str, Any]) -> Iterator[tuple[st
         )
         if not is_same:
             yield name, old, new
+
+
+def _interval(model: Model, name: str) -> list[float] | None:
+    """Give the 95 % interval of a parameter, named after its effect; None where the model has none."""
+    effect, _, parameter = name.rpartition(".")
+    ends = model.intervals.get(effect, {}).get(parameter)
+    return None if ends is None else list(ends)
+
+
+def _interval_text(ends: Sequence[float] | None) -> str:
+    return "" if ends is None else f" (95 %: {_text(ends[0])} to {_text(ends[1])})"
 
 
 def _text(value: float | Sequence[float] | None) -> str:

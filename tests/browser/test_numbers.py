@@ -40,7 +40,7 @@ def load(browser: Browser, language: str) -> None:
     code = SCRIPT.read_text().replace("export ", "")
     texts = Messages(language).for_script()
     browser.open("about:blank")
-    offered = "Object.assign(window, { showValues, cyclesLeft, showAlarm });"
+    offered = "Object.assign(window, { showValues, showFriction, cyclesLeft, showAlarm });"
     browser.run(LOAD, f"{code}\n{offered}", language, json.dumps(texts), TOLD_STDS)
 
 
@@ -73,6 +73,32 @@ def test_a_model_is_called_by_its_effects_in_words(browser: Browser) -> None:
     load(browser, "de")
     content = card(Model__Name="rail + viscous_friction") | {"model": {"de": "rail + Viskose Reibung"}}
     assert browser.run(SHOW, "Model/Name", "", content) == "rail + Viskose Reibung"
+
+
+@pytest.mark.parametrize(
+    ("language", "std", "common", "wear", "beside"),
+    [
+        ("en", 0.0017, 0.0095, "0.2665 ± 0.0034 / 0.4000", "± 0.019 alike in all cycles, beside it"),
+        ("de", 0.0017, 0.0095, "0,2665 ± 0,0034 / 0,4000", "± 0,019 daneben, in allen Zyklen gleich"),
+        ("en", 0.0017, None, "0.2665 ± 0.0034 / 0.4000", ""),
+        ("en", None, None, "0.2665 / 0.4000", ""),
+    ],
+)
+def test_the_head_of_a_cell_says_how_well_its_wear_is_known(
+    browser: Browser, language: str, std: float | None, common: float | None, wear: str, beside: str
+) -> None:
+    load(browser, language)
+    content = card(
+        Friction__StaticFriction=0.26, Friction__StaticFrictionStdDev=0.002, Wear__Level=0.2665,
+        Wear__LevelStdDev=std, Wear__LevelCommonStdDev=common, Wear__Limit=0.4, Wear__CyclesToLimit=None,
+    )  # fmt: skip
+    script = """
+        const root = document.createElement("div");
+        root.innerHTML = '<b data-field="wear"></b><b data-field="wear_common"></b>';
+        showFriction(root, arguments[0]);
+        return [...root.children].map((place) => place.textContent);
+    """
+    assert browser.run(script, content) == [wear, beside]
 
 
 def test_cycles_that_are_left_are_whole_ones_and_the_same_everywhere(browser: Browser) -> None:

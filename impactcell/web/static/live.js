@@ -85,7 +85,10 @@ export function showFriction(root, card) {
   set(root, "mu_s_band", std === null ? "" : toldStd(std));
   set(root, "mu_s_quality", kind === "good" ? "" : `${texts[kind]}: ${card.reasons[language].mu_s}`);
   const wear = quality(card, "Wear/Level"), doubt = level === null || wear === "good" ? "" : ` (${texts[wear]})`;
-  set(root, "wear", `${coefficient(level)} / ${coefficient(values["Wear/Limit"])}${doubt}`);
+  const levelStd = values["Wear/LevelStdDev"], commonStd = values["Wear/LevelCommonStdDev"];
+  const told = level === null || levelStd === null ? coefficient(level) : `${beside(levelStd, level)} ${toldStd(levelStd)}`;
+  set(root, "wear", `${told} / ${coefficient(values["Wear/Limit"])}${doubt}`);
+  set(root, "wear_common", level === null || !commonStd ? "" : `${toldStd(commonStd)} ${texts.common}`);
   for (const meter of root.querySelectorAll('[data-field="wear_meter"]')) {
     // Red from the limit on, amber from nine tenths of it: a value beyond `high` is far from an optimum below `low`.
     Object.assign(meter, { max: limit, value: level ?? 0, low: 0.9 * limit, high: 0.999 * limit, optimum: 0 });

@@ -15,6 +15,8 @@ MAX_ROWS: Final = 5000
 """Shots that are looked at."""
 UNITS: Final = {"s": "s", "n": "N", "m": "m", "kg": "kg", "per_min": "mm/min", "mm_per_min": "mm/min"}
 """Ends of column names in a campaign, and the unit that they stand for."""
+SHOWN_COLUMNS: Final = ("shot", "mu_s", "mu_s_std", "mu_k", "mu_k_std", "quality", "reason")
+"""What the page shows of each shot's friction."""
 
 
 def campaign_overview(directory: Path) -> dict[str, Any]:
@@ -63,10 +65,7 @@ def friction_overview(table: Path) -> dict[str, Any]:
         "mu_s": _mean(rows, "mu_s"),
         "mu_k": _mean(rows, "mu_k"),
         "good": sum(row.get("quality") == "good" for row in rows),
-        "rows": [
-            {name: row.get(name, "") for name in ("shot", "mu_s", "mu_s_std", "mu_k", "quality", "reason")}
-            for row in rows[:200]
-        ],
+        "rows": [{name: row.get(name, "") for name in SHOWN_COLUMNS} for row in rows[:200]],
     }
 
 

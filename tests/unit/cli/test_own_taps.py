@@ -42,7 +42,8 @@ journal: {{file: own.sqlite}}
 def oily(model: Model) -> Model:
     """The same plant in thick oil, of which the cell knows nothing."""
     effects = {"viscous_friction": {"viscous_coefficient_n_s_per_m": 300.0}}
-    return replace(model, plant=replace(model.plant, effects=effects), name="in oil")
+    intervals = {"viscous_friction": {"viscous_coefficient_n_s_per_m": (280.0, 325.0)}}
+    return replace(model, plant=replace(model.plant, effects=effects), name="in oil", intervals=intervals)
 
 
 @pytest.fixture
@@ -123,7 +124,7 @@ def test_a_dry_run_refuses_what_would_be_refused_and_tells_what_would_change(
     assert str(foretold.value) == str(refused.value)
     told = json.loads(capsys.readouterr().out)
     assert told["refused"] == str(refused.value)
-    assert [change["after"] for change in told["changes"]] == [300.0]
+    assert [(change["after"], change["ci95"]) for change in told["changes"]] == [(300.0, [280.0, 325.0])]
     with pytest.raises(SystemExit) as ended:
         run_verb(["model", "accept", str(cell), str(other), "--dry-run", "--anyway", "--json"])
     assert ended.value.code == 0

@@ -329,13 +329,17 @@ async def test_friction_of_each_shot(page: Page, verbs: Verbs) -> None:
                 "mu_s": 0.2 + 0.01 * n,
                 "mu_s_std": 0.001,
                 "mu_k": "",
+                "mu_k_std": "",
                 "quality": "good",
                 "reason": "",
             }
             for n in (1, 2)
         ]
         doubtful = {"quality": "uncertain", "reason": "mu_s 0.3183 is outside the calibrated 0.15-0.26"}
-        rows += [rows[0] | {"shot": n, "mu_s": 0.3183, "mu_k": 0.1523412} | doubtful for n in range(3, 250)]
+        rows += [
+            rows[0] | {"shot": n, "mu_s": 0.3183, "mu_k": 0.1523412, "mu_k_std": 0.0006} | doubtful
+            for n in range(3, 250)
+        ]
 
         def write(arguments: Sequence[str]) -> None:
             with Path(arguments[arguments.index("-o") + 1]).open("w", newline="") as file:
@@ -362,7 +366,7 @@ async def test_friction_of_each_shot(page: Page, verbs: Verbs) -> None:
         assert "200/249 shots are shown" in text
         assert f'lang="en">{noted}' in text
         german = (await client.get(f"/studies/{study}?lang=de")).text
-        assert "<td>0,3183</td><td>0,0020</td><td>0,15234</td>" in german
+        assert "<td>0,3183</td><td>0,0020</td><td>0,1523</td><td>0,0012</td>" in german
         assert "unsicher: µs 0,3183 liegt außerhalb des Kalibrierten" in german
         assert 'lang="de">µk hängt von der Richtung ab: 0,1597 ± 0,0016 in 6 Aufzeichnungen' in german
         assert 'lang="en">plant fitted to' in german
@@ -772,26 +776,36 @@ async def test_many_files_are_folded(page: Page) -> None:
 async def test_parameters_are_said_in_words_with_their_unit(page: Page) -> None:
     found = {
         "effect": "stribeck_friction",
-        "parameters": {"stribeck_velocity_m_s": {"value": 0.04}, "friction_increase": {"value": 0.03}},
+        "parameters": {
+            "stribeck_velocity_m_s": {"value": 0.04, "ci95": [0.035, 0.046]},
+            "friction_increase": {"value": 0.03},
+        },
     }
-    own = {"effect": "own_effect", "parameters": {"strength_n_per_m": {"value": 60.0}}}
+    strength = {"value": [60.0, 70.0], "ci95": [[57.0, 63.0], [66.0, None]]}
+    own = {"effect": "own_effect", "parameters": {"strength_n_per_m": strength}}
     changes = [
         {"parameter": name, "before": None, "after": 1.5}
         for name in ("mu_s", "stiffness_n_per_m", "viscous_friction.viscous_coefficient_n_s_per_m")
     ]
+    changes[2] |= {"ci95": [1.25, 1.75]}
     async with page.logged_in(Role.OBSERVER) as client:
         study = page.studies.store.begin("rail", "otto", CELL)
         study.stage, study.result = Stage.DONE, RESULT | {"effects": [found, own]}
         study.changes = CHANGES | {"changes": changes, "after": "rail + stribeck_friction + own_effect"}
         study.acceptances = [Acceptance("accept", "eva", 1, "rail + stribeck_friction")]
         shown = {code: (await client.get(f"/studies/{study.id}?lang={code}")).text for code in ("en", "de")}
-    assert "</b> · Stribeck velocity 0.04 m/s · friction increase 0.03" in shown["en"]
-    assert "</b> · Stribeck-Geschwindigkeit 0,04 m/s · Zunahme der Reibung 0,03" in shown["de"]
-    assert "Own effect</b> · strength n per m 60" in shown["en"]
+    assert "</b> · Stribeck velocity 0.04 m/s (95 %: 0.035 to 0.046) · friction increase 0.03" in shown["en"]
+    assert (
+        "</b> · Stribeck-Geschwindigkeit 0,04 m/s (95 %: 0,035 bis 0,046) · Zunahme der Reibung 0,03"
+        in shown["de"]
+    )
+    assert "Own effect</b> · strength n per m 60, 70 (95 %: 57 to 63, 66 to –)" in shown["en"]
     names = re.findall(r'<tr><td data-label="[^"]*">(.*?)</td>', shown["de"])
     assert "old → <b>rail + Stribeck friction + own_effect</b>" in shown["en"]
     assert "old → <b>rail + Stribeck-Reibung + own_effect</b>" in shown["de"]
     assert "rail + Stribeck-Reibung, eva" in shown["de"]
+    assert '<td data-label="Dann">1,5 (95 %: 1,25 bis 1,75)</td>' in shown["de"]
+    assert '<td data-label="Then">1.5</td>' in shown["en"]
     assert names == ["µs", "Steifigkeit [N/m]", "Viskose Reibung: viskoser Koeffizient [N s/m]"]
 
 
