@@ -117,7 +117,10 @@ DESCRIPTIONS: Final[Mapping[str, str]] = {
         "Anteil guter Werte, ab dem ein Aggregat gut ist, %."
     ),
     "Shows the alarm to people again.": "Zeigt die Meldung wieder.",
-    "Size of the last shift between batches.": "Größe des letzten Sprungs zwischen Chargen.",
+    "Size of the last shift between batches, as estimated by now; BatchShift has it as it was found.": (
+        "Größe des letzten Sprungs zwischen Chargen, nach jetziger Schätzung; BatchShift hat sie, wie er "
+        "gefunden wurde."
+    ),
     "Squared prediction error, in units of the noise.": "Quadrierter Restfehler, in Einheiten des Rauschens.",
     "TSquared from which on it makes a cycle deviant by itself.": (
         "TSquared, ab dem es allein einen Zyklus abweichend macht."

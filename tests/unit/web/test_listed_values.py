@@ -10,6 +10,7 @@ from impactcell.records import Coefficient, ModuleStatus, Quality
 from impactcell.web.cell_view import CellView
 from impactcell.web.interface import CellNews
 from impactcell.web.listed_values import listed_values
+from impactcell.web.messages import Messages
 from tests.snapshots import make_capture, make_snapshot
 
 ALL = (*CYCLE, *MODULE)
@@ -93,6 +94,20 @@ def test_only_what_has_changed_is_said_to_have() -> None:
     object.__setattr__(later, "alarms", first.alarms)  # as a cycle in which no alarm moves
     assert view.take(CellNews("press-1", later)) == {"card", "detail"}
     assert view.take(CellNews("press-1", status=view.status)) == set()
+
+
+@pytest.mark.parametrize(
+    ("language", "title", "found"),
+    [
+        ("en", "Last shift, as estimated by now", "as they were found"),
+        ("de", "Letzter Sprung, nach jetziger Schätzung", "wie sie gefunden wurden"),
+    ],
+)
+def test_two_sizes_of_one_shift_say_what_each_is(language: str, title: str, found: str) -> None:
+    """The alarm and the trend tell a shift as it was found, the value as it is estimated since."""
+    titles = {value.path: value.title for folder in listed_values(language).values() for value in folder}
+    assert titles["Batch/LastShift"] == title
+    assert found in Messages(language).for_script()["shifts"]
 
 
 def test_a_standard_deviation_without_a_value_of_its_own_is_shown_as_a_band() -> None:
