@@ -13,7 +13,7 @@ from impactcell.records.uncertainty import TOLD_STDS
 QUALITY_STYLE = {Quality.GOOD: "green", Quality.UNCERTAIN: "yellow", Quality.BAD: "red"}
 
 
-LEGEND = f"mu_s  • cycle  ░ level ± {TOLD_STDS:g} sd  ✗ deviant  ┆ shift"
+LEGEND = f"mu_s • cycle ░ level+batch ± {TOLD_STDS:g} sd ✗ deviant ┆ shift"
 
 
 def chart(snapshots: Sequence[Snapshot], columns: int, rows: int) -> Text:
@@ -56,10 +56,12 @@ def _shifts(snapshots: Sequence[Snapshot]) -> set[int]:
 
 
 def _band(snapshot: Snapshot) -> tuple[float, float]:
-    wear = snapshot.wear
-    offset = snapshot.batch.offset if math.isfinite(snapshot.batch.offset) else 0.0
-    centre = wear.level + offset
-    return centre - TOLD_STDS * wear.level_std, centre + TOLD_STDS * wear.level_std
+    wear, batch = snapshot.wear, snapshot.batch
+    offset, offset_std = (
+        value if math.isfinite(value) else 0.0 for value in (batch.offset, batch.offset_std)
+    )
+    centre, reach = wear.level + offset, TOLD_STDS * math.hypot(wear.level_std, offset_std)
+    return centre - reach, centre + reach
 
 
 def _mark(snapshot: Snapshot, row: int, scale: "_Scale", band: tuple[float, float]) -> tuple[str, str]:

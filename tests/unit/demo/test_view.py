@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
+from impactcell.demo.chart import LEGEND, chart
 from impactcell.demo.view import Scene, render
 from impactcell.records import (
     Alarm,
@@ -123,6 +124,18 @@ def test_a_shift_is_marked_where_it_was_not_where_it_was_found() -> None:
     }
     first = len("│ │ ") + 8
     assert columns == {first + 9 - 1}
+
+
+def test_the_band_is_as_wide_as_level_and_offset_are_unsure() -> None:
+    """Level 0.2 ± 0.003, offset 0.02 ± 0.004 (one standard deviation each): 0.22 ± 0.01 (two) with both."""
+    last = history(1)[0]
+    wear = replace(last.wear, level=0.2, level_std=0.003)
+    batch = replace(last.batch, offset=0.02, offset_std=0.004)
+    friction = replace(last.friction, mu_s=replace(last.friction.mu_s, value=0.22))
+    lines = chart([replace(last, wear=wear, batch=batch, friction=friction)], 1, 100).plain.splitlines()
+    row_height = (float(lines[0][:8]) - float(lines[99][:8])) / 99
+    assert sum(line[-1] in "░•" for line in lines) * row_height == pytest.approx(0.02, rel=0.05)
+    assert "level+batch ± 2 sd" in LEGEND
 
 
 def test_small_deviations_are_shown_with_the_decimals_that_they_need() -> None:
