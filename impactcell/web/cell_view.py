@@ -48,6 +48,10 @@ class _Tap:
     is_deviant: bool
 
 
+_INFINITE: Final = msgspec.Raw(b"1e999")
+"""JSON has no infinity, but a number that every reader takes for one."""
+
+
 def to_json(value: object) -> bytes:
     """Encode for the browser; what is not finite becomes null."""
     return msgspec.json.encode(value)
@@ -243,13 +247,18 @@ def alarm_content(cell: str, alarm: Alarm) -> dict[str, Any]:
 
 
 def _published(quantities: Iterable[Quantity[S]], source: S) -> tuple[dict[str, Any], dict[str, str]]:
-    """Read every published value but the arrays, which are curves; and the qualities that are not good."""
+    """Read every published value but the arrays, which are curves; and the qualities that are not good.
+
+    What is not known becomes null, what is infinite does not: a limit that is never reached.
+    """
     values: dict[str, Any] = {}
     qualities: dict[str, str] = {}
     for quantity in quantities:
         if quantity.is_array:
             continue
         value, quality = quantity.read(source)
+        if value == math.inf:
+            value = _INFINITE
         values[quantity.path] = number(value) if isinstance(value, float) else value
         if quality is not Quality.GOOD:
             qualities[quantity.path] = quality.name.lower()

@@ -1,6 +1,7 @@
 """How the script of the page writes numbers: with the digits that are known, alike wherever they stand."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from impactcell.alarms.rule import CycleInputs, RuleContext
 from impactcell.alarms.rules import batch_shift
 from impactcell.records import Evidence
 from impactcell.records.uncertainty import TOLD_STDS
+from impactcell.web.cell_view import CellView
+from impactcell.web.interface import CellNews
 from impactcell.web.messages import Messages
 from tests.browser.chromium import Browser
 from tests.snapshots import make_capture, make_snapshot
@@ -165,8 +168,28 @@ def test_cycles_left_are_not_said_where_wear_is_not_known(browser: Browser) -> N
     load(browser, "en")
     unknown = {"Wear/Level": None, "Wear/Limit": 0.25, "Wear/CyclesToLimit": None}
     assert browser.run("return cyclesLeft(arguments[0])", unknown) == "–"
-    flat = unknown | {"Wear/Level": 0.2, "Wear/CyclesToLimitLow": None}
-    assert browser.run("return cyclesLeft(arguments[0])", flat) == "limit is not being approached"
+    flat = unknown | {"Wear/Level": 0.2}
+    never = "return cyclesLeft({ ...arguments[0], 'Wear/CyclesToLimit': Infinity })"
+    assert browser.run(never, flat) == "limit is not being approached"
+
+
+@pytest.mark.parametrize(
+    ("language", "said"),
+    [("en", ("316 (from 49 to never)", "never")), ("de", ("316 (von 49 bis nie)", "nie"))],
+)
+def test_a_limit_that_is_perhaps_never_reached_is_said_to_be(
+    browser: Browser, language: str, said: tuple[str, str]
+) -> None:
+    """The sign for what is not known stood there."""
+    load(browser, language)
+    snapshot = make_snapshot(make_capture())
+    wear = replace(snapshot.wear, level=0.2, limit=0.25, cycles_to_limit=316.0, cycles_to_limit_low=49.0)
+    view = CellView("press-1")
+    view.take(CellNews("press-1", replace(snapshot, wear=wear)))
+    sent = view.encode("card").decode()
+    assert browser.run("return cyclesLeft(JSON.parse(arguments[0]).values)", sent) == said[0]
+    parsed = SHOW.replace("form, card] = arguments", "form, sent] = arguments, card = JSON.parse(sent)")
+    assert browser.run(parsed, "Wear/CyclesToLimitHigh", "cycles", sent) == said[1]
 
 
 @pytest.mark.parametrize(

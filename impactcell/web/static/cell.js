@@ -1,7 +1,7 @@
 // One cell in depth: its last tap, its trend, its signature.
 import { Chart } from "./charts.js";
 import { moment } from "./frame.js";
-import { TOLD_STDS, beside, coefficient, follow, hasCycle, number, set, showAlarm, showFriction, showState, showValues, texts, toldStd, withUnit } from "./live.js";
+import { TOLD_STDS, beside, coefficient, follow, hasCycle, number, set, showAlarm, showFriction, showState, showValues, stdOf, texts, toldStd, withUnit } from "./live.js";
 
 const root = document.querySelector(".cell"), cell = root.dataset.cell;
 // A band of one value at each x is nothing but its edges.
@@ -64,7 +64,7 @@ function showCard(card) {
   }
   showFriction(root, card);
   showValues(root, card);
-  const offset = values["Batch/Offset"], std = values["Batch/OffsetStdDev"], gap = values["Model/Gap"];
+  const offset = values["Batch/Offset"], std = stdOf(values, "Batch/Offset"), gap = values["Model/Gap"];
   const said = {
     cycle_time: moment(card.time_ms),
     batch_offset: offset === null ? "" : std === 0 ? texts.reference_batch : `${std === null ? coefficient(offset) : `${beside(std, offset)} ${toldStd(std)}`} ${texts.batch_offset}`,

@@ -23,7 +23,9 @@ export function beside(std, value) {
   return new Intl.NumberFormat(language, { minimumFractionDigits: decimals, maximumFractionDigits: decimals, useGrouping: false }).format(value);
 }
 /** Cycles still to come: whole ones, and none that is not sure. */
-export const wholeCycles = (value) => (Number.isFinite(value) ? number(Math.floor(value), 10) : "–");
+export const wholeCycles = (value) => (value === Infinity ? texts.never : Number.isFinite(value) ? number(Math.floor(value), 10) : "–");
+/** One standard deviation of a value; null where it is not known. */
+export const stdOf = (values, path) => (Number.isFinite(values[`${path}StdDev`]) ? values[`${path}StdDev`] : null);
 export const withUnit = (value, unit, digits) => (value === null || value === undefined ? "–" : `${number(value, digits)} ${unit}`);
 
 export function set(root, field, text) {
@@ -37,7 +39,7 @@ export const quality = (card, path) => card.qualities[path] ?? "good";
 export function showValues(root, card) {
   for (const place of root.querySelectorAll("[data-quantity]")) {
     const { quantity: path, unit, form } = place.dataset, value = card.values[path];
-    const std = card.values[`${path}StdDev`] ?? null;
+    const std = stdOf(card.values, path);
     let text = "–";
     if (typeof value === "boolean") text = value ? texts.yes : texts.no;
     else if (path === "Model/Name") text = card.model[language] || "–";
@@ -72,20 +74,20 @@ export function cyclesLeft(values) {
   const low = values["Wear/CyclesToLimitLow"], high = values["Wear/CyclesToLimitHigh"];
   if (level === null) return "–"; // not known, which is not the same as a limit that is out of sight
   if (limit !== null && level > limit) return high === 0 ? texts.passed : texts.perhaps_passed;
-  if (cycles === null) return texts.not_reached;
-  const range = low === null ? "" : ` (${texts.from} ${wholeCycles(low)}${high === null ? "" : ` ${texts.to} ${wholeCycles(high)}`})`;
+  if (cycles === Infinity) return texts.not_reached;
+  const range = low === null ? "" : ` (${texts.from} ${wholeCycles(low)} ${texts.to} ${wholeCycles(high)})`;
   return `${wholeCycles(cycles)}${range}`;
 }
 
 export function showFriction(root, card) {
   const { values } = card, level = values["Wear/Level"], limit = values["Wear/Limit"] ?? 1;
-  const std = values["Friction/StaticFrictionStdDev"], kind = quality(card, "Friction/StaticFriction");
+  const std = stdOf(values, "Friction/StaticFriction"), kind = quality(card, "Friction/StaticFriction");
   const mu_s = values["Friction/StaticFriction"];
   set(root, "mu_s", std === null ? coefficient(mu_s) : beside(std, mu_s));
   set(root, "mu_s_band", std === null ? "" : toldStd(std));
   set(root, "mu_s_quality", kind === "good" ? "" : `${texts[kind]}: ${card.reasons[language].mu_s}`);
   const wear = quality(card, "Wear/Level"), doubt = level === null || wear === "good" ? "" : ` (${texts[wear]})`;
-  const levelStd = values["Wear/LevelStdDev"], commonStd = values["Wear/LevelCommonStdDev"];
+  const levelStd = stdOf(values, "Wear/Level"), commonStd = stdOf(values, "Wear/LevelCommon");
   const told = level === null || levelStd === null ? coefficient(level) : `${beside(levelStd, level)} ${toldStd(levelStd)}`;
   set(root, "wear", `${told} / ${coefficient(values["Wear/Limit"])}${doubt}`);
   set(root, "wear_common", level === null || !commonStd ? "" : `${toldStd(commonStd)} ${texts.common}`);

@@ -17,6 +17,7 @@ SCRIPT_TEXTS: Texts = {
     "live_good": ("good", "gut"),
     "live_bad": ("not usable", "nicht verwendbar"),
     "live_common": ("alike in all cycles, beside it", "daneben, in allen Zyklen gleich"),
+    "live_never": ("never", "nie"),
     "live_passed": ("limit passed", "Grenze überschritten"),
     "live_perhaps_passed": ("at the limit, perhaps beyond", "an der Grenze, vielleicht darüber"),
     "live_usual": ("usual", "üblich"),

@@ -1,6 +1,7 @@
 """What the page shows of a cycle is the table of published quantities, whatever stands in it."""
 
 import json
+import math
 from dataclasses import replace
 
 import pytest
@@ -76,14 +77,20 @@ def test_a_card_has_every_value_in_the_unit_of_its_node() -> None:
         value, quality = quantity.read(source)  # type: ignore[arg-type]
         shown = card["values"][quantity.path]
         if isinstance(value, float):
-            assert (
-                shown is None
-                if value != value or abs(value) == float("inf")
-                else shown == pytest.approx(value, rel=1e-4)
-            )
+            assert shown is None if value != value else shown == pytest.approx(value, rel=1e-4)
         else:
             assert shown == value
         assert card["qualities"].get(quantity.path, "good") == quality.name.lower()
+
+
+def test_a_limit_that_is_never_reached_is_not_one_of_which_nothing_is_known() -> None:
+    snapshot = make_snapshot(make_capture())
+    wear = replace(snapshot.wear, cycles_to_limit=316.0, cycles_to_limit_low=math.nan)
+    view = CellView("press-1")
+    view.take(CellNews("press-1", replace(snapshot, wear=wear)))
+    values = json.loads(view.encode("card"))["values"]
+    told = [values[f"Wear/CyclesToLimit{end}"] for end in ("", "Low", "High")]
+    assert told == [316.0, None, math.inf]
 
 
 def test_only_what_has_changed_is_said_to_have() -> None:
