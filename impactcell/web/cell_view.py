@@ -12,7 +12,7 @@ import numpy as np
 from impactcell.alarms import is_retained
 from impactcell.german.positioning_reasons import german_positioning_reason
 from impactcell.quantities import BY_PATH, CYCLE, MODULE
-from impactcell.records import Alarm, Channel, ModuleStatus, Quality, Samples, Shelving, Snapshot
+from impactcell.records import Alarm, Capture, ModuleStatus, Quality, Samples, Shelving, Snapshot
 from impactcell.records.quantity import Quantity, S
 from impactcell.scada.alarm_events import event_id
 from impactcell.web.curves import Curve, decimate, envelope
@@ -25,8 +25,8 @@ RECENT_CYCLES = 120
 """Cycles of the small curve on a card."""
 USUAL_TAPS = 20
 """Earlier taps that say what is usual."""
-SAME_VELOCITY = 0.01
-"""Taps whose commanded velocities differ by less than this share are compared with each other."""
+ALIKE = 0.01
+"""Taps whose velocity, stroke and mass differ by less than this share are compared with each other."""
 SHOWN_TAPS = 12
 """Taps of a positioning task that are listed."""
 DIGITS = 5
@@ -41,11 +41,17 @@ KINDS: Final = ("recent", "alarms", "card", "detail")
 class _Tap:
     """One tap in curves, to compare later ones with."""
 
-    velocity_m_s: float
+    struck: tuple[float, float, float, int]
+    """Velocity (m/s), stroke (m), mass (kg) and direction."""
     force: Curve | None
     position: Curve | None
     signature: Curve
     is_deviant: bool
+
+    def is_alike(self, other: "_Tap") -> bool:
+        """Whether the other was struck alike; what is known of neither does not tell them apart."""
+        pairs = zip(self.struck, other.struck, strict=True)
+        return all(math.isclose(a, b, rel_tol=ALIKE) or (math.isnan(a) and math.isnan(b)) for a, b in pairs)
 
 
 _INFINITE: Final = msgspec.Raw(b"1e999")
@@ -100,7 +106,7 @@ class CellView:
             alarms = news.snapshot.alarms
             changed |= {"card", "detail"}
         if news.capture is not None and news.snapshot is not None:
-            self._take_tap(news.snapshot, news.capture.force, news.capture.position)
+            self._take_tap(news.snapshot, news.capture)
         for alarm in alarms:
             if self.conditions.get(alarm.name) is not alarm:
                 self.conditions[alarm.name] = alarm
@@ -136,8 +142,8 @@ class CellView:
             }
         )
 
-    def _take_tap(self, snapshot: Snapshot, force: Channel | None, position: Channel | None) -> None:
-        signature = snapshot.signature
+    def _take_tap(self, snapshot: Snapshot, capture: Capture) -> None:
+        signature, force, position = snapshot.signature, capture.force, capture.position
         if math.isfinite(signature.deviates_at_m):
             self._deviant = {
                 "cycle": snapshot.cycle,
@@ -146,7 +152,7 @@ class CellView:
             }
         self._taps.append(
             _Tap(
-                snapshot.velocity_m_s,
+                (snapshot.velocity_m_s, capture.stroke_m, snapshot.mass_kg, capture.direction),
                 None if force is None or not len(force.values) else decimate(force),
                 None if position is None or not len(position.values) else decimate(position),
                 Curve(signature.position_m, signature.friction, signature.friction),
@@ -183,11 +189,7 @@ class CellView:
         content: dict[str, Any] = {"taps": list(self._positioning), "deviant": self._deviant}
         if self._taps and self.snapshot is not None:
             tap, earlier = self._taps[-1], list(self._taps)[:-1]
-            alike = [  # what a deviant cycle did is not usual
-                t
-                for t in earlier
-                if not t.is_deviant and math.isclose(t.velocity_m_s, tap.velocity_m_s, rel_tol=SAME_VELOCITY)
-            ]
+            alike = [t for t in earlier if not t.is_deviant and t.is_alike(tap)]  # a deviant one is not usual
             content["usual_taps"] = len(alike)
             content["force"] = _compared(tap.force, (t.force for t in alike), 1e3, 1.0)
             content["position"] = _compared(tap.position, (t.position for t in alike), 1e3, 1e3)

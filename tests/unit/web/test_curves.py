@@ -1,6 +1,7 @@
 """Curves of a screen's width: no peak is lost, and a band is where most curves are."""
 
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -61,3 +62,33 @@ def test_a_deviant_cycle_is_not_in_the_band_of_the_usual_ones() -> None:
     assert detail["usual_taps"] == 4
     assert max(detail["signature"]["usual_high"]) == pytest.approx(0.15)
     assert detail["deviant"]["cycle"] == 4
+
+
+@pytest.mark.parametrize(
+    ("other", "usual"),
+    [
+        ({"mass_kg": 6.0}, 3),
+        ({"stroke_m": 2e-3}, 3),
+        ({"direction": -1}, 3),
+        ({"velocity_m_s": 0.02}, 3),
+        ({"mass_kg": 18.95}, 6),
+        ({"mass_kg": math.nan}, 3),
+    ],
+)
+def test_a_band_is_of_taps_that_were_struck_alike(other: dict[str, float], usual: int) -> None:
+    """Taps of 6 kg and of 38 kg made one band, which hid every tap."""
+    view = CellView("press-1")
+    for number in range(1, 8):
+        capture = make_capture(number)
+        if number % 2 == 0:
+            capture = replace(capture, **other)
+        view.take(CellNews("press-1", make_snapshot(capture), capture))
+    assert json.loads(view.encode("detail"))["usual_taps"] == usual
+
+
+def test_a_band_is_of_all_taps_where_no_mass_is_known() -> None:
+    view = CellView("press-1")
+    for number in range(1, 5):
+        capture = replace(make_capture(number), mass_kg=math.nan)
+        view.take(CellNews("press-1", make_snapshot(capture), capture))
+    assert json.loads(view.encode("detail"))["usual_taps"] == 3
