@@ -61,6 +61,8 @@ GRAVITY_M_S2 = 9.81
 """For what is said of a resistance in per cent of friction."""
 LEAST_PROBABILITY = 1e-6
 """Of a hypothesis, however long another was right: what a cell lacks may come later."""
+STEP_STD, STEP_PROBABILITY = 0.25, 0.01
+"""Of ln(friction) in a step that nobody announced, and how probable one is where a doubt begins."""
 MOST_EVIDENCE_OF_A_TAP = math.log(1e3)
 """ln of the factor by which one tap may tell two hypotheses apart: an outlier is no proof."""
 GAP_EVIDENCE = math.log(1e4)
@@ -203,8 +205,9 @@ def with_score(posterior: PlannerPosterior, score: float) -> PlannerPosterior:
     """Posterior after one more score of its predictions; where they turn out to be off, taps become cautious.
 
     A planner in doubt knows less of discrepancy and scatter than it thought: the probabilities of both move
-    halfway back to where they began. Predictions that are off are no evidence that the model is right, nor by
-    themselves that it lacks something: what taps have said against it stays said, and no more.
+    halfway back to where they began, and friction may have stepped. Predictions that are off are no evidence
+    that the model is right, nor by themselves that it lacks something: what taps have said against it stays
+    said, and no more.
     """
     watched = place_bets(posterior.watch, score)
     probabilities = posterior.probabilities
@@ -217,10 +220,25 @@ def with_score(posterior: PlannerPosterior, score: float) -> PlannerPosterior:
     halfway = np.sqrt(probabilities * PROBABILITIES)
     right = min(float(halfway[0] / halfway.sum()), float(probabilities[0]))
     lacking = (1.0 - right) * halfway[1:] / halfway[1:].sum()
-    doubting = join(parts_of(doubting), np.append(right, lacking), doubting)
+    parts = [_with_step_of_friction(part) for part in parts_of(doubting)]
+    doubting = join(parts, np.append(right, lacking), doubting)
     said = log_bayes_factor(posterior)
     told = max(said, min(log_bayes_factor(doubting), 0.0))
     return replace(doubting, uncounted_evidence=_evidence_of_all_taps(doubting) - told)
+
+
+def _with_step_of_friction(part: PlannerPosterior) -> PlannerPosterior:
+    """One hypothesis that holds possible that friction has just stepped."""
+    stepped = part.covs.copy()
+    stepped[:, FRICTION, FRICTION] += STEP_STD**2
+    weights = np.outer([1.0 - STEP_PROBABILITY, STEP_PROBABILITY], part.weights).ravel()
+    return replace(
+        part,
+        weights=weights,
+        means=np.tile(part.means, (2, 1)),
+        covs=np.concatenate([part.covs, stepped]),
+        hypotheses=np.zeros(weights.size),
+    )
 
 
 def condition_on_friction(

@@ -23,7 +23,7 @@ from impactcell.positioning.model_hypotheses import (
     with_model_accepted,
     with_score,
 )
-from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior
+from impactcell.positioning.planner_posterior import FRICTION, PARAMETERS, PlannerPosterior
 from impactcell.positioning.posterior_update import update_posterior
 from impactcell.positioning.scatter_hypotheses import GRID, PRIOR_WEIGHTS
 from impactcell.positioning.tap_model import TapModel
@@ -164,6 +164,25 @@ def test_doubt_takes_back_nothing_of_what_was_said_of_the_contact() -> None:
     assert log_bayes_factor(doubting) == pytest.approx(log_bayes_factor(lacking), abs=1e-9)
     accepted = with_model_accepted(doubting)
     assert log_bayes_factor(accepted) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_where_predictions_turn_out_off_friction_may_have_stepped() -> None:
+    learned, _ = taught(np.zeros(FEATURES), 15, 3)
+    moved = 1.4 * SLIDE_M
+
+    def friction(posterior: PlannerPosterior) -> float:
+        return float(posterior.mean[FRICTION] - learned.mean[FRICTION])
+
+    def miss(posterior: PlannerPosterior, moved_m: float) -> PlannerPosterior:
+        return update_posterior(with_score(posterior, 8.0), slide(np.zeros(FEATURES)), moved_m)
+
+    stepped = miss(learned, moved)
+    again = update_posterior(stepped, slide(np.zeros(FEATURES)), moved)
+    assert friction(again) == pytest.approx(-math.log(1.4), abs=0.05)  # it has
+    odd = miss(learned, moved)
+    for _ in range(4):
+        odd = update_posterior(odd, slide(np.zeros(FEATURES)), SLIDE_M)
+    assert friction(odd) == pytest.approx(0.0, abs=0.03)  # it has not: one tap was odd
 
 
 def test_an_accepted_model_lacks_nothing_until_taps_show_it_and_plans_as_before() -> None:

@@ -224,6 +224,32 @@ def test_the_bound_on_overshoot_is_kept_by_the_true_distribution() -> None:
         assert np.median(moved) == pytest.approx(tap.expected_m, rel=2e-3)
 
 
+@pytest.mark.parametrize("seed", [2, 3, 5, 8])
+def test_after_a_tap_far_astray_the_bound_on_overshoot_holds_again(seed: int) -> None:
+    """Friction has dropped by 30 % and nobody said so: the tap that meets it is foretold wrongly, no more."""
+    rng = np.random.default_rng([seed, 5])
+    planner = TapPlanner(tolerance_m=10e-6 if seed % 2 else 50e-6, plant=NOMINAL)
+    for _ in range(6):
+        mass, remaining = math.exp(rng.uniform(math.log(5.0), math.log(40.0))), rng.uniform(2e-3, 40e-3)
+        deliver(planner, NOMINAL, mass, remaining, rng)
+    mass, remaining = math.exp(rng.uniform(math.log(5.0), math.log(40.0))), rng.uniform(10e-3, 40e-3)
+    beyond = []
+    for _ in range(4):
+        tap = planner.next_tap(remaining, mass)
+        assert isinstance(tap, Tap)
+        friction = 0.7 * (1.0 + 0.03 * rng.standard_normal(4000))
+        moved = nominal_taps(
+            6.5e5, 465.0, 0.2 * friction, 0.152 * friction, mass, tap.velocity_m_s, tap.stroke_m
+        ).displacement_m
+        beyond.append(float((moved > remaining + planner.tolerance_m).mean()))
+        planner.observe(tap, float(moved[0]), mass)
+        remaining -= float(moved[0])
+        if abs(remaining) <= planner.tolerance_m:
+            break
+    assert len(beyond) > 1
+    assert max(beyond[1:]) <= 2e-3  # of 4000 outcomes, where 1e-3 is promised for the whole task
+
+
 @pytest.mark.parametrize(
     ("remaining", "mass", "message"),
     [(math.nan, 10.0, "remaining"), (1e-3, math.nan, "mass"), (1e-3, 0.0, "mass"), (1e-3, -3.0, "mass")],
