@@ -259,9 +259,10 @@ def _published(quantities: Iterable[Quantity[S]], source: S) -> tuple[dict[str, 
         if quantity.is_array:
             continue
         value, quality = quantity.read(source)
-        if value == math.inf:
-            value = _INFINITE
-        values[quantity.path] = number(value) if isinstance(value, float) else value
+        if isinstance(value, float):
+            values[quantity.path] = _INFINITE if value == math.inf else number(value)
+        else:
+            values[quantity.path] = value
         if quality is not Quality.GOOD:
             qualities[quantity.path] = quality.name.lower()
     return values, qualities

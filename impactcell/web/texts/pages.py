@@ -80,10 +80,14 @@ PAGE_TEXTS: Texts = {
     # a cell's page
     "last_tap": ("Last tap", "Letzter Stoß"),
     "last_tap_help": (
-        "The line is the last tap, the band what earlier taps did that were like it in velocity, stroke, "
-        "mass and direction.",
-        "Die Linie ist der letzte Stoß, das Band zeigt frühere Stöße gleicher Geschwindigkeit, Masse und "
-        "Richtung mit gleichem Hub.",
+        (
+            "The line is the last tap, the band what earlier taps did that were like it in velocity, "
+            "stroke, mass and direction."
+        ),
+        (
+            "Die Linie ist der letzte Stoß, das Band zeigt frühere Stöße gleicher Geschwindigkeit, Masse und "
+            "Richtung mit gleichem Hub."
+        ),
     ),
     "force": ("Contact force", "Kontaktkraft"),
     "position": ("Position", "Position"),
