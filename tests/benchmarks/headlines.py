@@ -98,7 +98,7 @@ HEADLINES: tuple[tuple[str, Mapping[str, Cell]], ...] = (
     (
         (
             "**Place.** Parts tapped to their targets on the simulator's plant: {inside} inside the "
-            "tolerance after ten tasks; overshoot {overshoot}. With each of 24 effects hidden in turn: "
+            "tolerance after ten tasks; overshoot {overshoot}. With each of 25 effects hidden in turn: "
             "{hidden_inside}; {hidden_overshoot}, where 0.1 % is promised."
         ),
         {

@@ -162,7 +162,9 @@ def by_condition(
             every_before += part_before
     over, settled = share(every, overshot), share([a for a in every if a.number >= LEARNING], inside)
     outside = beside_left(every, known.left)
-    totals = ["all", str(len(every)), str(over), over.interval, str(settled), outside]
+    too_far = str(over) if over.hits <= 1e-3 * over.of else f"**{over}**"
+    in_place = str(settled) if settled.hits >= 0.995 * settled.of else f"**{settled}**"
+    totals = ["all", str(len(every)), too_far, over.interval, in_place, outside]
     taps, beside = f"{np.mean([a.taps for a in every]):.2f}", beside_optimum(every, known.optimum, 1.05)
     rows.append([*totals, taps, beside, "", earlier(every_before)])
     return Table(
@@ -214,6 +216,9 @@ def store(seeds: str) -> Path:
     versions = [name for name, _, _ in figure.VERSIONS]
     attempts = {name: read_attempts(path_of(RESULTS, seeds, name)) for name in versions}
     both = set.intersection(*({(a.condition, a.cell) for a in part} for part in attempts.values()))
+    if not both:
+        names = ", ".join(str(path_of(RESULTS, seeds, name)) for name in versions)
+        raise SystemExit(f"nothing to draw: no task is in both of {names}")
     path = Path(figure.__file__).with_name(figure.STORED)
     with path.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
