@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import os
+import re
 import time
 from collections.abc import AsyncIterator
 from dataclasses import replace
@@ -144,6 +145,8 @@ async def test_a_link_that_is_cut(relay: Relay, browser: Browser) -> None:
     await asyncio.to_thread(enter, browser, relay)
     await relay.cut()
     await asyncio.to_thread(browser.until, lambda: is_offline(browser), "that nothing is heard")
+    notice = browser.find("#offline").text
+    assert re.search(r"\(\w+ \d+, \d{4}, \d\d:\d\d:\d\d\)$", notice), "as every time on the page"
     await relay.open()
     back = lambda: states(browser) == {"● live"} and not browser.all("#offline:not([hidden])")  # noqa: E731
     await asyncio.to_thread(browser.until, back, "cells that are live again")
@@ -214,6 +217,8 @@ async def test_a_tab_that_comes_in_front_again_without_the_service_says_so(
     await relay.cut()
     await asyncio.to_thread(browser.run, SEEN, True)
     await asyncio.to_thread(browser.until, lambda: is_offline(browser), "that nothing is heard")
+    notice = browser.find("#offline").text
+    assert re.search(r"\(\w+ \d+, \d{4}, \d\d:\d\d:\d\d\)$", notice), "as every time on the page"
     await relay.open()
     back = lambda: states(browser) == {"● live"} and not browser.all("#offline:not([hidden])")  # noqa: E731
     await asyncio.to_thread(browser.until, back, "cells that are live again")

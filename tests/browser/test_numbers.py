@@ -1,6 +1,7 @@
 """How the script of the page writes numbers: with the digits that are known, alike wherever they stand."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -40,7 +41,7 @@ SHOW = """
 
 
 def load(browser: Browser, language: str) -> None:
-    code = SCRIPT.read_text().replace("export ", "")
+    code = re.sub(r"^import .*|^export ", "", SCRIPT.read_text(), flags=re.MULTILINE)
     texts = Messages(language).for_script()
     browser.open("about:blank")
     offered = "Object.assign(window, { showValues, showFriction, cyclesLeft, showAlarm });"

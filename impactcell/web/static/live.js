@@ -1,4 +1,6 @@
 // The stream of what changes, and how it is written: numbers in the reader's language, texts never as markup.
+import { moment } from "./frame.js";
+
 export const texts = JSON.parse(document.getElementById("texts").textContent);
 const language = document.documentElement.lang;
 
@@ -154,7 +156,7 @@ export function showTour(card) {
 function showOffline(since) {
   const notice = document.getElementById("offline");
   if (!notice.hidden) return;
-  notice.textContent = `✕ ${texts.offline} (${since.toLocaleTimeString(language)})`;
+  notice.textContent = `✕ ${texts.offline} (${moment(since)})`;
   notice.hidden = false;
   document.body.classList.add("is-offline");
   showUnknown(texts.offline);
