@@ -75,6 +75,12 @@ STUDY_TEXTS: Texts = {
         "Zellen, die mit derselben Modelldatei laufen und dieses Modell auch nehmen:",
     ),
     "accept": ("Accept: put it into service", "Annehmen: in Betrieb nehmen"),
+    "accept_refused": (
+        "It is not put into service as things are. Once that is put right, or new taps are there, ask again.",
+        "So wird es nicht übernommen. Ist das behoben, oder gibt es neue Stöße, kann neu gefragt werden.",
+    ),
+    "accept_again": ("Judge again; accept if nothing speaks against it",
+                     "Neu beurteilen; annehmen, wenn nichts dagegen spricht"),
     "restore": ("Undo: put the model from before back", "Rückgängig: das vorige Modell wieder nehmen"),
     "accepting": ("The model is being changed …", "Das Modell wird gewechselt …"),
     "accept_engineers": ("Engineers can put it into service.", "Ingenieure können es in Betrieb nehmen."),

@@ -179,6 +179,15 @@ async def test_what_speaks_against_the_model_is_told_before_anybody_accepts_it(
     async with page.logged_in(Role.ENGINEER) as client:
         study, _ = await investigated(page, client)
         shown = {code: (await client.get(f"/studies/{study}?lang={code}")).text for code in ("en", "de")}
+        page.studies.store.find(study).changes = CHANGES  # type: ignore[union-attr]
+        free = (await client.get(f"/studies/{study}?lang=en")).text
+    assert "<button>Accept: put it into service</button>" in free
+    assert "Accept: put it into service" not in shown["en"]
+    assert '<button class="quiet">Judge again; accept if nothing speaks against it</button>' in shown["en"]
+    assert (
+        '<button class="quiet">Neu beurteilen; annehmen, wenn nichts dagegen spricht</button>' in shown["de"]
+    )
+    assert "Once that is put right, or new taps are there, ask again." in shown["en"]
     assert "the cell&#39;s own taps speak against it" in shown["en"]
     assert "die eigenen Stöße der Zelle sprechen dagegen" in shown["de"]
     assert "take this model too: press-2" in shown["en"]
