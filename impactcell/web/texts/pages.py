@@ -80,14 +80,8 @@ PAGE_TEXTS: Texts = {
     # a cell's page
     "last_tap": ("Last tap", "Letzter Stoß"),
     "last_tap_help": (
-        (
-            "The line is the last tap, the band what earlier taps did that were like it in velocity, "
-            "stroke, mass and direction."
-        ),
-        (
-            "Die Linie ist der letzte Stoß, das Band zeigt frühere Stöße gleicher Geschwindigkeit, Masse und "
-            "Richtung mit gleichem Hub."
-        ),
+        "Line: the last tap; band: earlier ones of like velocity, stroke, mass and direction.",
+        "Linie: letzter Stoß; Band: frühere mit gleichem Hub, gleicher Geschwindigkeit, Masse, Richtung.",
     ),
     "force": ("Contact force", "Kontaktkraft"),
     "position": ("Position", "Position"),
