@@ -40,7 +40,8 @@
 
 Outside the tree stands what an edge answers to its peer, and what ends in the room it belongs to: in
 `impactcell.opcua` StatusCodeError, DecodingError, RefusedError, InvalidArgumentError, SecureChannelError and
-UntrustedError; in `impactcell.web` RequestRefusedError and StudyFailedError.
+UntrustedError; in `impactcell.web` RequestRefusedError and StudyFailedError. ObjectionError of
+`impactcell.fieldbus` tells a task that its own objection has kept a tap from being commanded.
 """
 
 import math

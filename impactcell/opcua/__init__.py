@@ -12,6 +12,7 @@ answers of `host_interface`, and starts it. Below it, from the wire inwards:
 ===========================  ==============================================================================
 **host**
 `service_host`               puts listener, services and clock together
+`server_description`         what it tells of itself: what it is, and the limits that hold
 `host_interface`             settings, limits, and what the server asks of its host
 `asyncua_adapter`            all that is used of asyncua beside its public types
 `node_references`            attributes and references of nodes, read and written in place
