@@ -8,7 +8,7 @@ import yaml
 
 from impactcell.campaign.contents import CHANNELS, COLUMNS, Coordinate, Excitation, Sensor
 from impactcell.campaign.faults import LARGEST, Faults, read_text
-from impactcell.records.plausible_range import STROKE_M
+from impactcell.records.plausible_range import GRAVITY, STROKE_M
 
 FORMAT = 1
 """Version of the campaign directory."""
@@ -58,6 +58,8 @@ def read_header(file: Path, faults: Faults) -> Header | None:
     )
     if excitation is Excitation.TAP and stroke is not None and (doubt := STROKE_M.doubt(stroke)):
         reader.fault(actuator["stroke_m"], f"actuator.stroke_m: {doubt}")
+    if excitation is not Excitation.DRIVEN and gravity is not None and (doubt := GRAVITY.doubt(gravity)):
+        reader.fault(top["gravity_m_s2"], f"gravity_m_s2: {doubt}")
     coordinate = _coordinate(reader, top, excitation)
     sensors = _sensors(reader, top, coordinate)
     if len(faults) > noted or excitation is None or gravity is None or stroke is None:

@@ -44,3 +44,4 @@ class PlausibleRange:
 STROKE: Final = PlausibleRange("a stroke", "mm", 0.01, 100.0, {"m": 1e3, "µm": 1e-3})
 STROKE_M: Final = PlausibleRange("a stroke", "m", 1e-5, 0.1, {"mm": 1e-3, "µm": 1e-6})
 """The same for a stroke that is written in metres."""
+GRAVITY: Final = PlausibleRange("gravity", "m/s²", 1.0, 30.0, {"cm/s²": 1e-2, "mm/s²": 1e-3})

@@ -45,6 +45,16 @@ def test_only_what_goes_with_something_and_matters_is_said(problem: Problem) -> 
     assert "Richtung" in german
 
 
+def test_what_was_not_weighed_is_told_as_it_is_and_not_as_what_no_record_does(problem: Problem) -> None:
+    told = np.array([shot.mass_kg for shot in problem.shots.items])
+    (said,) = notes_of(problem, np.log1p(0.9 / told))
+    assert said.startswith("Nothing would remain if mass were +0.9 kg off in every shot")
+    assert note(said)[1].startswith("Die Masse: nichts bliebe übrig, wenn sie in jedem Stoß um +0,9 kg")
+    (steeper,) = notes_of(problem, 0.01 * (told - told.mean()))
+    assert "from shot to shot, the more the larger or smaller it is" in steeper
+    assert note(steeper)[0] == "de"
+
+
 def test_a_mass_that_differs_by_direction_is_no_error_of_each_shot() -> None:
     """It was `no_gap`, each shot's mass open."""
     given = campaign(JOB)

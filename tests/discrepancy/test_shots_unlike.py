@@ -57,6 +57,7 @@ def with_wrong(given: Campaign, change: Callable[[Capture], Capture], *numbers: 
         (lambda s: replace(s, mass_kg=1e3 * s.mass_kg), "mass_kg or force_n .*about 1e-3"),
         (lambda s: replace(s, position=scaled(s.position, 1e3)), r"position_m or time_s .*about 1e\+3"),
         (lambda s: replace(s, force=scaled(s.force, -1.0)), "force_n pulls with .* turn its sign"),
+        (lambda s: replace(s, position=scaled(s.position, -1.0)), "position_m goes .* turn its sign or dir"),
         (lambda s: replace(s, position=scaled(s.position, 0.0)), "position is constant|does not move"),
         (lambda s: ends_at(s, 0.008), r"record ends \d\.?\d* ms after contact, while .*: record until"),
     ],
@@ -71,6 +72,17 @@ def test_a_shot_of_which_a_column_is_wrong_is_left_out_and_told(
     language, said = german_sentences.note(note)
     assert language == "de"
     assert said.startswith("Stoß 7 ist ausgelassen: ")
+
+
+@pytest.mark.parametrize("channel", ["force", "position"])
+def test_a_sign_that_is_wrong_in_all_shots_is_refused_and_no_unit_is_blamed(channel: str) -> None:
+    given = taps()
+    turned = [replace(shot, **{channel: scaled(getattr(shot, channel), -1.0)}) for shot in given.shots]
+    told = rf"wrong in 24 of 24 shots; of the first, its {channel}_\w .*turn"
+    with pytest.raises(CampaignError, match=told):
+        prepare(replace(given, shots=tuple(turned)))
+    some = (*turned[:10], *given.shots[10:])  # fewer than half: told one by one
+    assert len(prepare(replace(given, shots=some)).shots) == 14
 
 
 def test_several_shots_with_the_same_slip_are_one_note() -> None:

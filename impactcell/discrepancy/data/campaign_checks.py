@@ -6,7 +6,7 @@ from dataclasses import replace
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.data.prepared_shots import PreparedShot
 from impactcell.discrepancy.data.shot_making import STRATEGIES, prepared_shot
-from impactcell.discrepancy.data.shots_unlike import unlike_shots
+from impactcell.discrepancy.data.shots_unlike import check_signs, unlike_shots
 from impactcell.discrepancy.data.unit_checks import check_units
 from impactcell.errors import CampaignError
 from impactcell.features import without_spikes
@@ -46,14 +46,16 @@ def check_campaign_units(campaign: Campaign) -> None:
 
 
 def check_shot_units(campaign: Campaign, shots: Sequence[PreparedShot]) -> None:
-    """Notice a unit that is wrong in most of a campaign's shots, or blocks.
+    """Notice a unit, or a sign, that is wrong in most of a campaign's shots, or blocks.
 
     Raises
     ------
     CampaignError
-        With the columns whose unit to check.
+        With the columns whose unit to check, or to turn.
     """
     strategy = STRATEGIES[campaign.excitation]
+    if campaign.excitation is Excitation.TAP:
+        check_signs(shots)
     check_units(strategy.unit_ratios(shot, campaign.gravity_m_s2) for shot in shots)
 
 

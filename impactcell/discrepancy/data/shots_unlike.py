@@ -12,6 +12,7 @@ import numpy as np
 
 from impactcell.discrepancy.data.prepared_shots import FORCE, POSITION, PreparedShot
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio, likely_factor
+from impactcell.errors import CampaignError
 from impactcell.records import Samples
 
 MIN_SHOTS = 6
@@ -24,8 +25,10 @@ LARGEST_SLIP = 30.0
 """Factor up to which it is told as it is; beyond, it is one between units."""
 BESIDE = 1.3
 """Factor beyond which another ratio of an unlike shot is not like the others' either."""
-PULLS = 2.0
-"""Times its largest value a force is negative whose sign is wrong."""
+REVERSED = 2.0
+"""Times its largest value a force, or a place from the first on, is negative whose sign is wrong."""
+FIRST = 8
+"""Samples of the position that tell where a part lies first."""
 LAST_PART, FEWEST_LAST = 20, 8
 """Part of a record's positions that tells whether it ends in motion, and as many if there are enough."""
 STILL_MOVING = 0.5
@@ -46,7 +49,7 @@ def unlike_shots(
         Of the same shots.
     """
     factors = [dict[PlausibleRatio, float]() for _ in shots]
-    unlike: set[int] = set()
+    unlike = {place for place, shot in enumerate(shots) if _wrong_sign(shot)}
     for ratio in dict.fromkeys(ratio for of_shot in ratios for ratio in of_shot):
         places = [place for place, of_shot in enumerate(ratios) if ratio in of_shot]
         if math.isinf(ratio.far) or len(places) < MIN_SHOTS:
@@ -63,11 +66,24 @@ def unlike_shots(
                 factors[place][ratio] = float(factor[i])
     told = {
         shots[place].number: (
-            _pulls(shots[place]) or _ends_in_motion(shots[place]) or _told(factors[place], ratios[place])
+            _wrong_sign(shots[place]) or _ends_in_motion(shots[place]) or _told(factors[place], ratios[place])
         )
         for place in sorted(unlike)
     }
     return told if 2 * len(told) < len(shots) else {}
+
+
+def check_signs(shots: Sequence[PreparedShot]) -> None:
+    """Notice a force, a position or directions that are turned in most shots.
+
+    Raises
+    ------
+    CampaignError
+        With the column to turn.
+    """
+    told = [told for shot in shots if (told := _wrong_sign(shot))]
+    if 2 * len(told) >= max(len(shots), 1):
+        raise CampaignError(f"a sign is wrong in {len(told)} of {len(shots)} shots; of the first, {told[0]}")
 
 
 def notes_of_unlike(unlike: Mapping[int, str]) -> tuple[str, ...]:
@@ -100,12 +116,21 @@ def _distance(one: PreparedShot, other: PreparedShot) -> float:
     return math.fsum(told) + OTHER_DIRECTION * (one.direction != other.direction)
 
 
-def _pulls(shot: PreparedShot) -> str:
-    """Say that a force pulls, where it does."""
-    force = shot.values[FORCE]
-    if not len(force) or -force.min() < PULLS * max(float(force.max()), 0.0):
-        return ""
-    return f"its force_n pulls with {-force.min():.4g} N, where a contact only pushes: turn its sign"
+def _wrong_sign(shot: PreparedShot) -> str:
+    """Say that a force pulls, or a part that is struck moves the other way, where it does."""
+    force, along = shot.values[FORCE], shot.values[POSITION]
+    if _is_reversed(force):
+        return f"its force_n pulls with {-force.min():.4g} N, where a contact only pushes: turn its sign"
+    if shot.velocity_m_s > 0.0 and len(along) > FIRST:
+        away = shot.direction * (along - np.median(along[:FIRST]))
+        if _is_reversed(away):
+            back_mm = -1e3 * away.min()
+            return f"its position_m goes {back_mm:.3g} mm against the tap: turn its sign or direction"
+    return ""
+
+
+def _is_reversed(values: Samples) -> bool:
+    return len(values) > 0 and float(values.min()) < -REVERSED * max(float(values.max()), 0.0)
 
 
 def _ends_in_motion(shot: PreparedShot) -> str:

@@ -19,6 +19,10 @@ _WORDS = {
     "log_velocity": "velocity were off what is told",
     "log_mass": "mass were off what is told",
 }
+_OWN = {"log_velocity": ("velocity", 6e4, "mm/min"), "log_mass": ("mass", 1.0, "kg")}
+"""Covariate that is the number itself, and the unit in which it is told."""
+AS_MUCH = 0.3
+"""Of what a number is off by in the mean: where it scatters by less, it is off by as much in every shot."""
 
 
 def dependence_notes(problem: Problem, fitted: Fit, names: Sequence[str]) -> tuple[str, ...]:
@@ -31,11 +35,31 @@ def dependence_notes(problem: Problem, fitted: Fit, names: Sequence[str]) -> tup
         found = _closest(problem, getattr(fitted.shot_parameters, name), _least(problem, name))
         if found is not None:
             covariate, r = found
+            if covariate == _OWN.get(name, ("",))[0]:
+                notes.append(_off_by(problem, name, getattr(fitted.shot_parameters, name)))
+                continue
             notes.append(
                 f"Nothing would remain if {_WORDS[name]}, shot by shot, but so it goes with {covariate} "
                 f"(correlation {r:+.2f}), which no error of a record does."
             )
     return tuple(notes)
+
+
+def _off_by(problem: Problem, name: str, off: Samples) -> str:
+    """Say of a number whose error goes with itself by how much it is off, and whether in every shot alike."""
+    covariate, unit, symbol = _OWN[name]
+    told = unit * np.array([shot.covariates[covariate] for shot in problem.shots.items])
+    more = told * np.expm1(off)
+    mean, std = float(more.mean()), float(more.std())
+    if std < AS_MUCH * abs(mean):
+        return (
+            f"Nothing would remain if {covariate} were {mean:+.3g} {symbol} off in every shot, whatever is "
+            "told: a zero, or what was not weighed with it? Check it."
+        )
+    return (
+        f"Nothing would remain if {covariate} were off by {mean:+.3g} {symbol} in the mean, {std:.2g} from "
+        f"shot to shot, the more the larger or smaller it is: check how {covariate} was told."
+    )
 
 
 def _least(problem: Problem, name: str) -> float:

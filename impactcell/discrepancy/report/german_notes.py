@@ -56,6 +56,8 @@ def _left_out(match: re.Match[str]) -> str:
         )
     elif pulls := re.fullmatch(r"its force_n pulls with (\S+) N, .*", why):
         said = f"force_n zieht mit {pulls[1]} N, wo ein Kontakt nur drückt: das Vorzeichen umkehren"
+    elif against := re.fullmatch(r"its position_m goes (\S+) mm against the tap: .*", why):
+        said = f"position_m läuft {against[1]} mm gegen den Stoß: Vorzeichen oder direction umkehren"
     elif ends := re.fullmatch(r"its record ends (\S+) ms after contact, while .* at (\S+) mm/s: .*", why):
         said = (
             f"die Aufzeichnung endet {ends[1]} ms nach dem Kontakt, während das Teil sich mit {ends[2]} mm/s "
@@ -100,6 +102,13 @@ NOTES: Final[Patterns] = (
      r"from shot to shot, more than the (\S+ %) .*"),
      lambda m: f"{SETTINGS[m[1]]}: nichts bliebe übrig, wenn sie im Mittel um {m[2]}, von Stoß zu Stoß um "
      f"{m[3]} von der Angabe abwiche, mehr als die {m[4]}, die der Messung zugeschrieben werden: prüfen."),
+    ((r"Nothing would remain if (velocity|mass) were (\S+ \S+) off in every shot, whatever is told: .*"),
+     lambda m: f"{SETTINGS[m[1]]}: nichts bliebe übrig, wenn sie in jedem Stoß um {m[2]} von der Angabe "
+     "abwiche, wie groß sie auch ist: ein Nullpunkt, oder was nicht mitgewogen wurde? Prüfen."),
+    ((r"Nothing would remain if (velocity|mass) were off by (\S+ \S+) in the mean, (\S+) from shot to shot, "
+      r"the more the larger or smaller .*"),
+     lambda m: f"{SETTINGS[m[1]]}: nichts bliebe übrig, wenn sie im Mittel um {m[2]}, von Stoß zu Stoß um "
+     f"{m[3]} von der Angabe abwiche, und das mit ihrer Größe: prüfen, wie sie angegeben wurde."),
     ((r"Nothing would remain if (first contact|velocity|mass) .*, but so it goes with (.+?) "
       r"\(correlation (\S+)\), .*"),
      lambda m: f"Nichts bliebe übrig, wenn {DOUBTED[m[1]]} Stoß für Stoß anders wäre als angegeben; doch so "

@@ -109,6 +109,11 @@ def test_start_position_and_covariates_are_kept(tmp_path: Path) -> None:
         ("format: 1\nexcitation: tap\ngravity: 9.8\n", 3, "unknown key 'gravity'"),
         ("format: 1\nexcitation: tap\ngravity_m_s2: heavy\n", 3, "gravity_m_s2 is 'heavy'"),
         ("format: 1\nexcitation: tap\ngravity_m_s2: .nan\n", 3, "positive number"),
+        (
+            "format: 1\nexcitation: tap\ngravity_m_s2: 981\n",
+            3,
+            "gravity of 981 m/s² is hardly meant, where taps have 1 to 30 m/s²: if that",
+        ),
         ("format: 1\nexcitation: tap\nactuator: {stroke_m: -1}\n", 3, "actuator.stroke_m is '-1'"),
         (
             "format: 1\nexcitation: tap\nactuator:\n  stroke_m: 1.5\n",
