@@ -49,7 +49,8 @@ def unlike_shots(
         Of the same shots.
     """
     factors = [dict[PlausibleRatio, float]() for _ in shots]
-    unlike = {place for place, shot in enumerate(shots) if _wrong_sign(shot)}
+    turned = {place: said for place, shot in enumerate(shots) if (said := _wrong_sign(shot))}
+    unlike = set(turned)
     for ratio in dict.fromkeys(ratio for of_shot in ratios for ratio in of_shot):
         places = [place for place, of_shot in enumerate(ratios) if ratio in of_shot]
         if math.isinf(ratio.far) or len(places) < MIN_SHOTS:
@@ -66,7 +67,7 @@ def unlike_shots(
                 factors[place][ratio] = float(factor[i])
     told = {
         shots[place].number: (
-            _wrong_sign(shots[place]) or _ends_in_motion(shots[place]) or _told(factors[place], ratios[place])
+            turned.get(place) or _ends_in_motion(shots[place]) or _told(factors[place], ratios[place])
         )
         for place in sorted(unlike)
     }
@@ -81,9 +82,11 @@ def check_signs(shots: Sequence[PreparedShot]) -> None:
     CampaignError
         With the column to turn.
     """
-    told = [told for shot in shots if (told := _wrong_sign(shot))]
-    if 2 * len(told) >= max(len(shots), 1):
-        raise CampaignError(f"a sign is wrong in {len(told)} of {len(shots)} shots; of the first, {told[0]}")
+    turned = [said for shot in shots if (said := _wrong_sign(shot))]
+    if 2 * len(turned) >= max(len(shots), 1):
+        raise CampaignError(
+            f"a sign is wrong in {len(turned)} of {len(shots)} shots; of the first, {turned[0]}"
+        )
 
 
 def notes_of_unlike(unlike: Mapping[int, str]) -> tuple[str, ...]:
