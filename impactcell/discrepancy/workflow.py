@@ -221,7 +221,8 @@ def investigate(
     if not conclusion.remaining.explained and not missing:
         report_step("looking for a law that nobody has listed")
         measure = GapMeasure(held_problem, floor, outcome.replicates, seed)
-        law = find_law((problem, context.coarse, final), measure, outcome.held_final, seed)
+        base = (problem, context.coarse, final)
+        law = find_law(base, measure, outcome.held_final, seed, selection.outdone)
     report_step("planning the next experiment")
     parameters = profile_parameters(problem, final, linearise(problem, final), shared_error(evidence))
     stated = (
@@ -250,7 +251,7 @@ def investigate(
         validation=outcome.validation,
         simulation=simulate_held_out(held_problem, nominal, final),
         unexplained=describe_gap(problem, selection.nominal) if conclusion.verdict == UNKNOWN else None,
-        experiments=propose_experiments(problem, final, tied, prepared.batches, limits),
+        experiments=propose_experiments(problem, final, tied, prepared.batches, limits, conclusion.ties),
         law=law,
         plant=plant,
         seed=seed,

@@ -80,7 +80,8 @@ def german_effect(identifier: str) -> str:
     ('Viskose Reibung', 'own effect')
     """
     german = german_texts(identifier)
-    return in_words(identifier) if german is None else german.name
+    words = re.sub(r"^friction over column ", "Reibung über der Spalte ", in_words(identifier))
+    return words if german is None else german.name
 
 
 def german_texts(identifier: str) -> German | None:

@@ -17,8 +17,14 @@ def in_words(identifier: str) -> str:
 
     >>> in_words("hunt_crossley_damping"), in_words("stribeck_velocity"), in_words("surface_tilt")
     ('Hunt-Crossley damping', 'Stribeck velocity', 'surface tilt')
+
+    Of a function of a column of `shots.csv` the letters of the column are told.
+
+    >>> in_words("free_friction_over_column_oil_temperature_a3f09b")
+    'friction over column oil_temperature'
     """
-    words = identifier.replace("_", " ")
+    over_column = re.fullmatch(r"free_friction_over_column_(\w+)_[0-9a-f]{6}", identifier)
+    words = f"friction over column {over_column[1]}" if over_column else identifier.replace("_", " ")
     for plain, proper in PROPER.items():
         words = re.sub(rf"\b{plain}\b", proper, words)
     return words

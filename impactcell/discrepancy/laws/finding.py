@@ -14,12 +14,18 @@ from impactcell.discrepancy.laws.fitted_function import (
     gives_energy,
     slices_of,
 )
-from impactcell.discrepancy.laws.free_term import SMOOTHNESS, FreeTerm, fit_free_terms, pair_forms_of
+from impactcell.discrepancy.laws.free_term import (
+    SMOOTHNESS,
+    FreeTerm,
+    fit_free_terms,
+    free_forms_of,
+    pair_forms_of,
+)
 from impactcell.discrepancy.laws.law import Law
 from impactcell.discrepancy.laws.refit import FittedLaw, refit_forms, tied_with
 from impactcell.discrepancy.laws.tangent import tangent
 from impactcell.discrepancy.model import Fit, Problem, fit, refit_shot_parameters
-from impactcell.discrepancy.search import GapChange, GapMeasure, Part
+from impactcell.discrepancy.search import GapChange, GapMeasure, Outdone, Part
 from impactcell.errors import DiscrepancyError
 from impactcell.physics.free_column_forms import printed
 
@@ -94,6 +100,7 @@ def find_law(
     measure: GapMeasure,
     held_base: Fit,
     seed: int,
+    outdone: Outdone | None = None,
 ) -> LawFinding | None:
     """Look for the law that a model lacks; None where no covariate was gone through far enough to say.
 
@@ -107,10 +114,14 @@ def find_law(
         The same model with their own factors.
     seed : int
         Of the inner split, by which smoothness and place are chosen, and of the resampling of the proof.
+    outdone : Outdone, optional
+        A name that fell: where a column of `shots.csv` has taken it, that is the place.
     """
     problem, coarse, base = training
     rough = base if coarse is problem else refit_shot_parameters(coarse, base)
-    single = _best_finding(training, rough, measure, held_base, fit_free_terms(coarse, rough, seed))
+    forms = [form for form in free_forms_of(coarse) if form.is_between_shots]
+    known = [form for form in forms if outdone and form.effect.identifier == outdone.form]
+    single = _best_finding(training, rough, measure, held_base, fit_free_terms(coarse, rough, seed, known))
     if single is None or not single.refused or single.change.after.trace <= MOST_LEFT:
         return single
     # No function of one covariate is enough: what it leaves may depend on a second one.

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from impactcell.discrepancy.data import decimate
+from impactcell.discrepancy.laws.column_rivals import hold_against_columns
 from impactcell.discrepancy.laws.free_term import FreeTerm, candidate_terms
 from impactcell.discrepancy.laws.scored_model import ScoredModel, score_term
 from impactcell.discrepancy.laws.standing import (
@@ -59,8 +60,14 @@ def hold_against_free_forms(context: SearchContext, selection: SelectionResult) 
 
     Where a model of an effect and a term reaches the noise, that effect is named if no term alone does as
     well, with every effect tied that does as well beside a term of its own. Otherwise what the search has
-    found to stand out falls where a free form explains as much.
+    found to stand out falls where a free form explains as much. What acts between shots is held against the
+    columns of `shots.csv` in any case.
     """
+    return hold_against_columns(context, _hold_against_places(context, selection))
+
+
+def _hold_against_places(context: SearchContext, selection: SelectionResult) -> SelectionResult:
+    """Let free forms in the traces compete, where something is left there."""
     if not _asks(context, selection):
         return selection
     nominal = selection.nominal.fit

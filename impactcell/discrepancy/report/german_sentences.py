@@ -60,6 +60,8 @@ _SETTINGS: Final = (
     (r"^load the force sensor .*", "den Kraftsensor mit einem bekannten Gewicht belasten"),
     (r"^repeat the campaign .*",
      "die Kampagne mit anderer Folge von Chargen, Richtungen und Ruhezeiten wiederholen"),
+    (r"^the same settings again, column (.+) in another order$",
+     r"dieselben Einstellungen noch einmal, die Spalte \1 in anderer Reihenfolge"),
     (r"^record the actuator's position$", "die Position des Antriebs aufzeichnen"),
     (r"^no setting within reach .*",
      "keine erreichbare Einstellung unterscheidet sie: eines von beiden für sich messen"),

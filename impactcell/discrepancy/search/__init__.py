@@ -1,10 +1,12 @@
 """Where a fitted model fails and which effect mends it: tests, candidates, selection, proof."""
 
-from impactcell.discrepancy.search.acceptance import Outdone, SelectionResult, exchanged, reject
+from impactcell.discrepancy.search.acceptance import Outdone, SelectionResult, exchanged, fitted_with, reject
 from impactcell.discrepancy.search.between_shots import (
     chance_by_exchange,
     chance_of_narrowing,
     chance_of_order,
+    exchange_rng,
+    factor_patterns,
     trace_rivals,
 )
 from impactcell.discrepancy.search.candidate_fits import (
@@ -13,6 +15,7 @@ from impactcell.discrepancy.search.candidate_fits import (
     is_at_bound,
     refine,
     screen,
+    without_each_effect,
 )
 from impactcell.discrepancy.search.conclusion import (
     NAMED,
@@ -40,7 +43,7 @@ from impactcell.discrepancy.search.gap_measure import (
     GapMeasure,
 )
 from impactcell.discrepancy.search.held_out import HeldOutOutcome, OpenedShots
-from impactcell.discrepancy.search.indistinguishability import CandidateFit, compare_fits
+from impactcell.discrepancy.search.indistinguishability import CandidateFit, compare_fits, widest_rival
 from impactcell.discrepancy.search.model_error import (
     ModelError,
     estimate_beside_error,
@@ -99,9 +102,12 @@ __all__ = [
     "describe_gap",
     "estimate_beside_error",
     "estimate_model_error",
+    "exchange_rng",
     "exchanged",
+    "factor_patterns",
     "fit_all_samples",
     "fit_between_shots",
+    "fitted_with",
     "is_at_bound",
     "missing_shots",
     "nested_models",
@@ -115,4 +121,6 @@ __all__ = [
     "shared_error",
     "simulate_held_out",
     "trace_rivals",
+    "widest_rival",
+    "without_each_effect",
 ]

@@ -173,18 +173,30 @@ def chance_of_order(
     float or None
         None where the effect acts on static friction alone: the signs of the shots' scores tell that.
     """
+    patterns = factor_patterns(context.problem, evidence, effect)
+    if not len(patterns):
+        return None
+    return chance_by_exchange(log_factor, patterns, exchange_rng(context))
+
+
+def factor_patterns(problem: Problem, evidence: ModelEvidence, effect: str) -> Samples:
+    """List what logarithms of friction factors follow under an effect, shape (Q, n), at points of its grid.
+
+    None where it acts on static friction alone.
+    """
     candidates = evidence.candidate_scan.candidates
     number = candidates.names.index(effect)
     rows = [
-        candidate_scores.between_shot_factors(context.problem, effect, point)
+        candidate_scores.between_shot_factors(problem, effect, point)
         for point, group in zip(candidates.points, candidates.group, strict=True)
         if group == number
     ]
-    patterns = [row for row in rows if row is not None]
-    if not patterns:
-        return None
-    rng = np.random.default_rng([context.seed, EXCHANGE_STREAM])
-    return chance_by_exchange(log_factor, np.array(patterns), rng)
+    return np.array([row for row in rows if row is not None]).reshape(-1, problem.count)
+
+
+def exchange_rng(context: SearchContext) -> np.random.Generator:
+    """Random numbers of the orders in which shots are drawn."""
+    return np.random.default_rng([context.seed, EXCHANGE_STREAM])
 
 
 def chance_by_exchange(log_factor: Samples, patterns: Samples, rng: np.random.Generator) -> float:

@@ -5,8 +5,9 @@ of one model with its noise and scatter, judged by both.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from scipy.stats import norm
@@ -15,7 +16,8 @@ from impactcell.discrepancy.data import CellLimits, PreparedShot, ShotSet, conca
 from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
 from impactcell.errors import PhysicsError
 from impactcell.physics import Kind
-from impactcell.physics.effects import LIBRARY
+from impactcell.physics.effects import LIBRARY, find_effect
+from impactcell.physics.free_column_forms import COLUMN_PREFIX, printed
 from impactcell.records import Samples
 
 POWER = 0.9
@@ -63,6 +65,7 @@ def propose_experiments(
     rivals: Sequence[tuple[str, str, Fit]],
     batches: Sequence[str],
     limits: CellLimits = UNLIMITED,
+    ties: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> tuple[Proposal, ...]:
     """For each tie the cheapest setting that breaks it.
 
@@ -75,13 +78,25 @@ def propose_experiments(
         Names of the batches, in order of appearance.
     limits : CellLimits
         Of the cell in which the shots would be made.
+    ties : mapping
+        Of each effect all that is tied with it, columns of `shots.csv` among them.
     """
     settings = problem.shots.excitation.settings_within_reach(
         problem.shots.items, best.shot_parameters.mass_kg, batches, limits
     )
-    return tuple(
+    experiments = [
         _cheapest_experiment(problem, best, fit, settings, (effect, rival)) for effect, rival, fit in rivals
-    )
+    ]
+    return (*experiments, *_other_orders(ties))
+
+
+def _other_orders(ties: Mapping[str, Sequence[str]]) -> Iterator[Proposal]:
+    """Say what tells effects from the columns that are tied with them."""
+    for effect, tied in ties.items():
+        for rival in (name for name in tied if name.startswith(COLUMN_PREFIX)):
+            (column,) = find_effect(rival).columns
+            setting = f"the same settings again, column {printed(column)} in another order"
+            yield Proposal((effect, rival), setting, 0, 1.0)
 
 
 def _cheapest_experiment(
