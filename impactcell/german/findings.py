@@ -139,7 +139,10 @@ def german_headline(result: Mapping[str, Any]) -> str:
             said = f"Kein bekannter Effekt erklärt{what}{_where(result)}."
             if result.get("unconfirmed"):
                 names = enumerated([*map(german_effect, result["unconfirmed"])], "und")
-                said = f"{names} würde angepasste Messungen erklären, zurückgehaltene bestätigen es nicht."
+                why = "zurückgehaltene bestätigen es nicht"
+                if "without repeated settings held-out shots" in result.get("headline", ""):
+                    why = "ohne Wiederholungen können zurückgehaltene es nicht bestätigen"
+                said = f"{names} würde angepasste Messungen erklären, {why}."
             said += _outdone(result)
         case _:
             said = f"Es fehlt: {_missing(result)}; damit fällt {_fall(result, before, after)}."

@@ -232,6 +232,13 @@ def test_the_equation_of_a_law_of_taps_is_all_german_and_its_numbers_are_short(c
                     "hat Ausreißer. Was sich in Ruhe bewegt, zählt als Rauschen: noise_std_n unter sensors: "
                     "force in campaign.yaml angeben, wenn es bekannt ist.")),
         ),
+        (
+            ("The noise of position is stated as 1.5 µm, and neighbouring samples scatter by 3.1 µm: gaps "
+             "are told in what is stated, and so are too large; check noise_std_m of sensors: position in ..."),
+            ("de", ("Das Rauschen (Position) ist mit 1,5 µm angegeben, und benachbarte Messwerte streuen um "
+                    "3,1 µm: Abweichungen zählen in dem, was angegeben ist, und sind damit zu groß; "
+                    "noise_std_m unter sensors: position in campaign.yaml prüfen.")),
+        ),
         ("Shot 7 has a gap in time; what happened in it is lost.",
          ("de", "Stoß 7 hat eine Lücke in der Zeit; was darin geschah, ist verloren.")),
         ("Data, clipped: shot 2: the force stands at its upper end, 5.2, for 12 samples.",

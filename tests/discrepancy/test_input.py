@@ -17,6 +17,7 @@ from impactcell import campaign as campaigns
 from impactcell.campaign import Campaign, Excitation, Sensor
 from impactcell.cli.app import app
 from impactcell.cli.discrepancy import discrepancy
+from impactcell.discrepancy.data import sensor_noise
 from impactcell.discrepancy.data.prepared_campaign import prepare
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.workflow import investigate
@@ -133,6 +134,22 @@ def test_without_a_stroke_the_actuator_halts_as_it_loses_contact() -> None:
     sensors = {"force": Sensor(1e4, 0.4), "position": Sensor(1e4, 1.5e-6)}
     found = investigate(Campaign(Excitation.TAP, shots, sensors=sensors))
     assert found.verdict == "no_gap"
+
+
+@pytest.mark.parametrize(("share", "doubted"), [(1.0, 0), (0.5, 1)])
+def test_noise_that_is_stated_too_small_is_doubted(share: float, doubted: int) -> None:
+    """Samples that scatter by more than what is stated of them make a gap of any model."""
+    given = make(shots=12)
+    force = replace(given.sensors["force"], noise_std=share * given.sensors["force"].noise_std)
+    shots = tuple(
+        replace(shot, force=shot.force and replace(shot.force, noise_std=force.noise_std))
+        for shot in given.shots
+    )
+    notes = sensor_noise(
+        prepare(replace(given, shots=shots, sensors={**given.sensors, "force": force}))
+    ).notes
+    assert sum("neighbouring samples scatter by" in note for note in notes) == doubted
+    assert all("check noise_std_n of sensors: force in campaign.yaml" in note for note in notes)
 
 
 def test_unequal_rates_and_gaps_in_time_cost_nothing_but_are_said() -> None:

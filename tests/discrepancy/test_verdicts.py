@@ -12,6 +12,7 @@ from scipy.stats import f as fisher
 from impactcell.campaign import Campaign, Excitation, Sensor
 from impactcell.discrepancy.data.noise_floor import NoiseFloor, ReplicateSpread
 from impactcell.discrepancy.model.least_squares import Fit
+from impactcell.discrepancy.report.page import SENTENCES
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.report.sentences import headline
 from impactcell.discrepancy.search.conclusion import missing_shots
@@ -19,8 +20,10 @@ from impactcell.discrepancy.search.confirmation import NestedModels, confirmed
 from impactcell.discrepancy.search.gap import Gap, Part, narrows
 from impactcell.discrepancy.search.gap_measure import GapChange, GapMeasure
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
+from impactcell.german.findings import german_headline
 from impactcell.records import Capture, Channel
 from tests.benchmarks._discrepancy_driven import Job, record
+from tests.discrepancy import study
 from tests.discrepancy.study import name_effects
 from tests.discrepancy.test_workflow import investigated, make
 
@@ -274,6 +277,18 @@ def test_what_held_out_shots_do_not_confirm_is_not_named(monkeypatch: pytest.Mon
     assert outcome["unconfirmed"] == ["viscous_friction"]
     assert found.final is found.nominal
     assert headline(found).startswith("Viscous friction would explain the training shots, but held-out")
+
+
+def test_without_repeated_settings_a_drift_cannot_be_confirmed_and_the_report_says_so() -> None:
+    job = study.Job("single", ("friction_drift",), 8311, strength=1.5, shots=60, replicates=False)
+    found = investigate(study.campaign(job), seed=1, library=("friction_drift", "viscous_friction"))
+    outcome = result_document(found)
+    assert (outcome["verdict"], outcome["unconfirmed"]) == ("unknown", ["friction_drift"])
+    assert outcome["noise_floor"]["replicate_spread"] is None
+    assert "but without repeated settings held-out shots cannot confirm it" in outcome["headline"]
+    assert "ohne Wiederholungen können zurückgehaltene es nicht bestätigen" in german_headline(outcome)
+    for said in SENTENCES.values():
+        assert said.next_step(found).startswith(("the same settings again: how", "dasselbe noch einmal: wie"))
 
 
 def test_the_range_expected_without_a_gap_holds_the_gaps_of_noise(viscous: DiscrepancyResult) -> None:

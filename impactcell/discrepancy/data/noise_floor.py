@@ -20,6 +20,8 @@ MIN_DEGREES_OF_FREEDOM = 3
 """Fewer degrees of freedom give no spread of replicates: it would be uncertain by half."""
 MIN_REPLICATE_SPREAD = 1e-9
 """Smallest spread of replicates, so that equal factors divide nothing by zero."""
+DOUBTED_FACTOR = 1.5
+"""Ratio of estimated and stated noise beyond which what is stated is doubted, and told."""
 TOLD_IN = ((1.0, "N", "noise_std_n"), (1e6, "µm", "noise_std_m"), (1e6, "µm", "noise_std_m"))
 """What the noise of each channel is told in: how many of a unit are one of SI, the unit, its key in YAML."""
 
@@ -80,9 +82,21 @@ def sensor_noise(prepared: PreparedCampaign) -> NoiseFloor:
                 f"check the unit of sensors.{name} in campaign.yaml and of the column in traces"
             )
             raise CampaignError(message)
+        if estimate > DOUBTED_FACTOR * stated:
+            notes.append(_doubted(channel, stated, estimate))
         stds.append(stated)
         sources.append("stated")
     return NoiseFloor((stds[0], stds[1], stds[2]), (sources[0], sources[1], sources[2]), tuple(notes))
+
+
+def _doubted(channel: int, stated: float, estimate: float) -> str:
+    """Say that samples scatter by more than the noise that is stated of them."""
+    name, (scale, unit, key) = CHANNELS[channel], TOLD_IN[channel]
+    return (
+        f"The noise of {name} is stated as {scale * stated:.3g} {unit}, and neighbouring samples scatter by "
+        f"{scale * estimate:.3g} {unit}: gaps are told in what is stated, and so are too large; "
+        f"check {key} of sensors: {name} in campaign.yaml."
+    )
 
 
 def _of_samples(channel: int, std: float, resting: NoiseAtRest | None) -> str:

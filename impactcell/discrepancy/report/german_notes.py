@@ -83,6 +83,10 @@ NOTES: Final[Patterns] = (
     (r"The noise of (\w+) is not stated; (\S+(?: \S+)?) was estimated from neigh.*",
      lambda m: f"Das Rauschen ({phrase(m[1])}) ist nicht angegeben; {m[2]} ist aus benachbarten Messwerten "
      "geschätzt, eine untere Schranke, wo es korreliert ist."),
+    (r"The noise of (\w+) is stated as (\S+ \S+), and .* scatter by (\S+ [^:]+): .* check (\w+) of .*",
+     lambda m: f"Das Rauschen ({phrase(m[1])}) ist mit {m[2]} angegeben, und benachbarte Messwerte streuen "
+     f"um {m[3]}: Abweichungen zählen in dem, was angegeben ist, und sind damit zu groß; {m[4]} unter "
+     f"sensors: {m[1]} in campaign.yaml prüfen."),
     (r"First contact lies (\S+) to (\S+) µs from t = 0, .*",
      (r"Der erste Kontakt liegt \1 bis \2 µs von t = 0, innerhalb eines Abtastschritts: "
       "er wird Stoß für Stoß angepasst.")),

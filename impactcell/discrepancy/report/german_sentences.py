@@ -177,6 +177,8 @@ def next_step(result: DiscrepancyResult) -> str:
         return (
             "die Masse des Teils, die kein Gleiten zeigt: ohne sie kann keine Zelle mit diesem Modell laufen"
         )
+    if sentences.lacks_replicates(result):
+        return "dasselbe noch einmal: wie weit Reibung zwischen gleichen Messungen streut, ist nicht bekannt"
     if conclusion.remaining.explained:
         return "nichts weiter; ob es so bleibt, zeigt die Abweichung auf der Seite der Zelle"
     place = result.unexplained or next(iter(conclusion.remaining.where), None)

@@ -8,6 +8,7 @@ from impactcell.discrepancy.search import NO_GAP, UNTESTED, Remaining, Validatio
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import open_loop_sentence
+from impactcell.physics import Kind
 from impactcell.physics.effect_names import as_title, in_words
 from impactcell.physics.effects import find_effect
 from impactcell.physics.free_column_forms import printed
@@ -113,6 +114,8 @@ def next_step(result: DiscrepancyResult) -> str:
         return f"about {conclusion.missing_shots} {unit} more, at settings like these"
     if result.per_kilogram:
         return "the mass of the part, which no slide shows: without it no cell can run with this model"
+    if lacks_replicates(result):
+        return "the same settings again: how far friction scatters between shots alike is not known"
     if conclusion.remaining.explained:
         return "nothing more; the gap on the cell's page shows whether it stays so"
     place = result.unexplained or next(iter(conclusion.remaining.where), None)
@@ -175,6 +178,13 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
     }
 
 
+def lacks_replicates(result: DiscrepancyResult) -> bool:
+    """Whether no setting was repeated, and what is not confirmed acts between shots."""
+    unconfirmed = result.conclusion.unconfirmed
+    acts_between = [find_effect(name).kind is Kind.BETWEEN_SHOTS for name in unconfirmed]
+    return math.isnan(result.replicates.spread) and bool(unconfirmed) and all(acts_between)
+
+
 def _outdone(result: DiscrepancyResult) -> str:
     """Say which name comes nearest, and why it is not the answer; empty where none does."""
     outdone = result.selection.outdone
@@ -208,9 +218,12 @@ def _conclusion(result: DiscrepancyResult) -> str:
             )
         if conclusion.unconfirmed:
             names = enumerated([*map(phrase, conclusion.unconfirmed)], "and")
+            why = "held-out shots do not confirm it"
+            if lacks_replicates(result):
+                why = "without repeated settings held-out shots cannot confirm it"
             said = (
-                f"{as_title(names)} would explain the training shots, but held-out shots do not confirm "
-                f"it: their gap is {_gap(proof)} noise floors"
+                f"{as_title(names)} would explain the training shots, but {why}: their gap is {_gap(proof)} "
+                "noise floors"
             )
         return f"{said}{_where(result)}.{_outdone(result)}"
     groups = [
