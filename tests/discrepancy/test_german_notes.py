@@ -103,16 +103,17 @@ def test_every_reason_for_naming_nothing_is_said_in_german(code: FunctionType, l
 
 def test_a_reason_of_one_covariate_and_of_two() -> None:
     english = (
-        "the best term, mu (1 + s(|x'|)), leaves 2.31 noise floors: what is missing is no function of speed "
-        "alone; of two covariates: the smoothest spline predicts best, so that the data tell nothing of how "
-        "the term bends; shots over a wider range of speed and oil would; the columns oil and age had fewer "
-        "than 8 different values, too little variety for a function"
+        "the best term, mu (1 + s(|x'|)), leaves 2.31 of 7.4 noise floors: what is missing is no "
+        "function of speed alone; of two covariates: the smoothest spline predicts best, so that the "
+        "data tell nothing of how the term bends; shots over a wider range of speed and oil would; the "
+        "columns oil and age had fewer than 8 different values, too little variety for a function"
     )
     german = (
-        "der beste Term, mu (1 + s(|x'|)), lässt 2,31 Rauschschwellen übrig: was fehlt, ist keine Funktion "
-        "allein von Geschwindigkeit; über zwei Größen: der glatteste Spline sagt am besten voraus, so dass "
-        "die Daten nichts von einer Krümmung sagen; Stöße über einen größeren Bereich von Geschwindigkeit "
-        "und oil täten es; zu wenig verschiedene Werte für eine Funktion (unter 8) hatte: oil und age"
+        "der beste Term, mu (1 + s(|x'|)), lässt 2,31 von 7,4 Rauschschwellen übrig: was fehlt, ist "
+        "keine Funktion allein von Geschwindigkeit; über zwei Größen: der glatteste Spline sagt am "
+        "besten voraus, so dass die Daten nichts von einer Krümmung sagen; Stöße über einen größeren "
+        "Bereich von Geschwindigkeit und oil täten es; zu wenig verschiedene Werte für eine Funktion "
+        "(unter 8) hatte: oil und age"
     )
     assert german_sentences.reason(english) == ("de", german)
 

@@ -234,7 +234,7 @@ def test_the_equation_of_a_law_of_taps_is_all_german_and_its_numbers_are_short(c
         ),
         (
             ("The noise of position is stated as 1.5 µm, and neighbouring samples scatter by 3.1 µm: gaps "
-             "are told in what is stated, and so are too large; check noise_std_m of sensors: position in ..."),
+             "are told in what is stated, and so are too large; check noise_std_m of sensors: position ..."),
             ("de", ("Das Rauschen (Position) ist mit 1,5 µm angegeben, und benachbarte Messwerte streuen um "
                     "3,1 µm: Abweichungen zählen in dem, was angegeben ist, und sind damit zu groß; "
                     "noise_std_m unter sensors: position in campaign.yaml prüfen.")),

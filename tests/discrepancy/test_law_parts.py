@@ -78,11 +78,31 @@ def test_only_the_smoothest_spline_tells_nothing_of_how_a_term_bends(
     monkeypatch.setattr(finding, "gives_energy", lambda *_: False)
     form = SimpleNamespace(covariates=("speed",), second="", effect=SimpleNamespace(equation="s(v)"))
     term: Any = SimpleNamespace(smoothness=smoothness, form=form)
-    change: Any = SimpleNamespace(is_real=lambda: True, after=SimpleNamespace(of=lambda _: 1.0), parts=())
+    change = change_of_gap(4.0, 1.0)
     said = finding._refusal(term, None, change, 2.0)
     assert bool(said) is (smoothness == max(finding.SMOOTHNESS))
     law: Any = SimpleNamespace(function=None)
     assert finding._refusal(term, law, change, 2.0) == ""
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "falls"),
+    [(1.05, 1.03, True), (1.05, 1.01, False), (1.4, 1.19, False), (1.4, 1.21, True), (6.0, 1.19, False)],
+)
+def test_what_leaves_most_of_a_small_gap_is_not_the_law_that_is_missing(
+    monkeypatch: pytest.MonkeyPatch, before: float, after: float, falls: bool
+) -> None:
+    monkeypatch.setattr(finding, "gives_energy", lambda *_: False)
+    form = SimpleNamespace(covariates=("time",), second="", effect=SimpleNamespace(equation="s(t)"))
+    term: Any = SimpleNamespace(smoothness=1e-4, form=form)
+    said = finding._refusal(term, None, change_of_gap(before, after), finding.MOST_LEFT)
+    assert bool(said) is falls
+    assert falls is (f"leaves {after:.3g} of {before:.3g} noise floors" in said)
+
+
+def change_of_gap(before: float, after: float) -> Any:
+    told = [SimpleNamespace(of=lambda _, value=value: value) for value in (before, after)]
+    return SimpleNamespace(is_real=lambda: True, before=told[0], after=told[1], parts=())
 
 
 def test_a_value_past_the_end_of_its_range_by_rounding_begins_at_the_end() -> None:

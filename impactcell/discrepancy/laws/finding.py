@@ -35,6 +35,9 @@ TIED_PLACES = 2.2
 """Standard deviations over shots within which two places predict alike, as for named effects."""
 MOST_LEFT = 1.2
 """Gap of the held-out traces, in noise floors, up to which a term is the law that was missing."""
+MOST_SHARE_LEFT = 0.5
+"""Share of the squared gap above the noise that it may leave [1]: beside a gap of 1.05 anything comes below
+`MOST_LEFT`."""
 MOST_STEPS = 9
 """Gauss-Newton steps with all samples, from where few came to rest."""
 SETTLING_STEPS = 40
@@ -258,11 +261,11 @@ def _refusal(term: FreeTerm, law: FittedLaw | None, change: GapChange, most_left
     """Why nothing is proposed, if so; `most_left` is the gap that it may leave."""
     if not change.is_real():
         return "on held-out shots the gap does not fall by more than chance"
-    left = change.after.of(change.parts)
-    if left > most_left:
+    left, before = (gap.of(change.parts) for gap in (change.after, change.before))
+    if left > most_left or left**2 - 1.0 > MOST_SHARE_LEFT * (before**2 - 1.0):
         return (
-            f"the best term, {term.form.effect.equation}, leaves {left:.3g} noise floors: what "
-            f"is missing is no function of {_named(term)}{'' if term.form.second else ' alone'}"
+            f"the best term, {term.form.effect.equation}, leaves {left:.3g} of {before:.3g} noise "
+            f"floors: what is missing is no function of {_named(term)}{'' if term.form.second else ' alone'}"
         )
     if gives_energy(term, law):
         return (

@@ -18,9 +18,10 @@ REASONS: Final[Patterns] = (
     (r"on held-out shots it says no more than the best function of one by more than chance",
      "an zurückgehaltenen Stößen sagt sie über die beste von einer Größe hinaus nur, was Zufall ist"),
     (r"no second one was gone through far enough", "keine zweite wurde weit genug durchfahren"),
-    (r"the best term, ([^;]*), leaves (\S+) noise floors: [^;]* no function of ([^;]+?)( alone)?",
-     lambda m: f"der beste Term, {m[1]}, lässt {m[2]} Rauschschwellen übrig: was fehlt, ist keine Funktion "
-     f"{'allein ' if m[4] else ''}von {_in_words(m[3])}"),
+    ((r"the best term, ([^;]*), leaves (\S+)(?: of (\S+))? noise floors: [^;]* no function of ([^;]+?)"
+      r"( alone)?"),
+     lambda m: f"der beste Term, {m[1]}, lässt {m[2]}{f' von {m[3]}' if m[3] else ''} Rauschschwellen übrig: "
+     f"was fehlt, ist keine Funktion {'allein ' if m[5] else ''}von {_in_words(m[4])}"),
     (r"the term would give energy: ([^;]*) becomes negative in the range [^;]*",
      r"der Term gäbe Energie ab: \1 wird im durchfahrenen Bereich negativ, also fehlt etwas anderes"),
     (r"the smoothest spline predicts best, so that the data tell nothing of how the term bends",
