@@ -227,7 +227,7 @@ def investigate(
     parameters = profile_parameters(problem, final, linearise(problem, final), shared_error(evidence))
     stated = (
         *(one for one in parameters if not one.effect),
-        *estimate_effects(context, evidence, parameters),
+        *estimate_effects(context, evidence, parameters, selection.nominal),
     )
     tied = _tied_models(selection, conclusion.established)
     for _effect, _rival, model in tied:

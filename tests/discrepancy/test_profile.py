@@ -79,7 +79,7 @@ def test_beside_what_remains_they_hold_what_fits_as_well_further_from_a_bound() 
     start = np.append(nominal.theta, problem.coordinates[-1].coordinate(truth))
     model = fit(problem, start, nominal.shot_parameters, spread=nominal.spread)
     alone = profile_parameters(problem, model, linearise(problem, model))
-    (beside,) = estimate_effects(context, context.test_model(model), alone)
+    (beside,) = estimate_effects(context, context.test_model(model), alone, context.test_model(nominal))
     assert abs(_of(beside.effect, alone).value / truth - 1.0) > 0.2
     assert abs(beside.value / truth - 1.0) < 0.05
     assert beside.low <= truth <= beside.high < 2.0 * truth

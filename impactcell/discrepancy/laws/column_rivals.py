@@ -17,9 +17,10 @@ from impactcell.discrepancy.laws.free_term import SMOOTHNESS, FreeTerm, free_for
 from impactcell.discrepancy.laws.scored_model import score_fit, score_term
 from impactcell.discrepancy.laws.standing import SAMPLES
 from impactcell.discrepancy.laws.term_start import fit_free_term
-from impactcell.discrepancy.model import Fit, Problem
+from impactcell.discrepancy.model import Fit, Problem, fit, refit_shot_parameters
 from impactcell.discrepancy.search import (
     POLICY,
+    ModelEvidence,
     Outdone,
     SearchContext,
     SelectionResult,
@@ -73,7 +74,7 @@ def _rival_columns(
     context : SearchContext
         With a few samples of each shot.
     """
-    named, *_ = (*refine(context, [fit for fit in (selection.accepted,) if fit is not None]), None)
+    named, *_ = (*refine(context, [one for one in (selection.accepted,) if one is not None]), None)
     if named is None:
         return
     patterns = factor_patterns(context.coarse, selection.nominal, effect)
@@ -81,7 +82,7 @@ def _rival_columns(
         return
     shots, error = context.problem.count, POLICY.between_shots_error
     spread = score_fit(context.coarse, named, effect).variance_of_factors ** 0.5
-    starts = [fit for fit in without_each_effect(selection.nominal.fit, named) if effect not in fit.effects]
+    starts = [one for one in without_each_effect(selection.nominal.fit, named) if effect not in one.effects]
     for base in refine(context, starts):
         for line in _lines(context, base, frozenset(LIBRARY[effect].columns)):
             column, rng = line.visited.values[None], exchange_rng(context)
@@ -93,6 +94,40 @@ def _rival_columns(
             is_ahead = chance <= error or widest_rival(left, shots) < spread
             if is_ahead or left <= widest_rival(spread, shots):
                 yield line.form.effect.identifier, is_ahead
+
+
+def beside_column(context: SearchContext, nominal: ModelEvidence, model: Fit) -> tuple[Problem, Fit] | None:
+    """Fit a model with a straight line in the column that its friction factors follow most.
+
+    Parameters
+    ----------
+    nominal : ModelEvidence
+        Against the model without effects: the points of their grids.
+
+    Returns
+    -------
+    tuple of Problem and Fit, or None
+        None where factors follow no column, or no effect of the model acts between shots.
+    """
+    names = [name for name in nominal.candidate_scan.candidates.names if name in model.effects]
+    names = [name for name in names if LIBRARY[name].kind is Kind.BETWEEN_SHOTS]
+    patterns = np.array([row for name in names for row in factor_patterns(context.coarse, nominal, name)])
+    if not len(patterns):
+        return None
+    own = [column for name in names for column in LIBRARY[name].columns]
+    rough = refit_shot_parameters(context.coarse.with_effects(model.effects), model)
+    factors, followed = rough.shot_parameters.log_factor, dict[float, FreeTerm]()
+    for line in _lines(context, rough, own):
+        column = _apart(line.visited.values[None], patterns)
+        followed.setdefault(chance_by_exchange(factors, column, exchange_rng(context)), line)
+    if min(followed, default=1.0) > POLICY.between_shots_error:
+        return None
+    term = followed[min(followed)]
+    try:
+        start = term.fit
+        return term.problem, fit(term.problem, start.theta, start.shot_parameters, spread=start.spread)
+    except DiscrepancyError:
+        return None
 
 
 def _apart(patterns: Samples, others: Samples) -> Samples:
@@ -124,9 +159,11 @@ def _without(context: SearchContext, selection: SelectionResult, effect: str, co
     added = tuple(name for name in selection.added if name != effect)
     if not added or selection.accepted is None:
         return replace(reject(selection.nominal, selection.final, selection.alternatives), outdone=outdone)
-    fit = fitted_with(selection, added)
+    known = fitted_with(selection, added)
     starts = without_each_effect(selection.nominal.fit, selection.accepted)
-    fits = [fit] if fit else fit_all_samples(context, [one for one in starts if effect not in one.effects])
+    fits = (
+        [known] if known else fit_all_samples(context, [one for one in starts if effect not in one.effects])
+    )
     if not fits:
         return replace(reject(selection.nominal, selection.final, selection.alternatives), outdone=outdone)
     return replace(

@@ -2,13 +2,15 @@
 
 What a model lacks pulls the parameters of its effects along, in all shots alike, and no scatter between shots
 tells of it. So where something remains, the free form that does best beside the model is fitted with it, and
-the effects' parameters are those of this fit; what the form leaves in its turn widens their intervals.
+the effects' parameters are those of this fit; what the form leaves in its turn widens their intervals. Where
+friction goes with a column of `shots.csv` beside an effect between shots, a line in it is that form.
 """
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 from impactcell.discrepancy.data import decimate
+from impactcell.discrepancy.laws.column_rivals import beside_column
 from impactcell.discrepancy.laws.covariates import visited
 from impactcell.discrepancy.laws.free_term import FIRST_TRY
 from impactcell.discrepancy.laws.scored_model import MIN_GAIN, score_fit
@@ -32,7 +34,10 @@ from impactcell.physics.remainder_forms import REMAINDER_FORMS
 
 
 def estimate_effects(
-    context: SearchContext, evidence: ModelEvidence, alone: Sequence[ParameterEstimate]
+    context: SearchContext,
+    evidence: ModelEvidence,
+    alone: Sequence[ParameterEstimate],
+    nominal: ModelEvidence,
 ) -> tuple[ParameterEstimate, ...]:
     """Parameters of a model's effects with their intervals: beside a free form, if something remains.
 
@@ -42,12 +47,14 @@ def estimate_effects(
         Against the model.
     alone : sequence of ParameterEstimate
         Of the model as it stands.
+    nominal : ModelEvidence
+        Against the model without them.
     """
     model, has_contact = evidence.fit, context.problem.shots.excitation.has_contact
     own = tuple(one for one in alone if one.effect)
     if not own or not has_contact or evidence.p_value > ALPHA:
         return own
-    fitted = _beside_form(context, model)
+    fitted = beside_column(context, nominal, model) or _beside_form(context, model)
     if fitted is None:
         return own
     beside = estimate_beside_error(*fitted, context.prepared)
