@@ -50,14 +50,21 @@ def detect_change(
 
 
 def refined_change_point(state: TrackerState, bank: Samples) -> ChangePoint | None:
-    """Let the cycles since say more of the bank's last change: when it was and how large."""
+    """Let the cycles since say more of the bank's last change: when it was and how large.
+
+    Where no hypothesis of it is left beside one of no change, that is its size: none. Where those of later
+    changes alone are left they say nothing of it, and it stays as it was told.
+    """
     change = state.change_point
     if change is None or change.detected_at != state.accepted:
         return change
     if state.rate_change is not None and state.rate_change.detected_at > change.detected_at:
         return change
-    located = run_length_bank.locate_change_point(bank, state.accepted_before, state.accepted)
-    return ChangePoint(*located, change.detected_at, change.statistic, change.threshold)
+    first, size, std = run_length_bank.locate_change_point(bank, state.accepted_before, state.accepted)
+    if math.isnan(size):
+        oldest = run_length_bank.records(bank)["change_cycle"][0]
+        return replace(change, size=0.0) if oldest <= state.accepted_before else change
+    return replace(change, cycle=first, size=size, size_std=std)
 
 
 def compare_with_previous_batch(

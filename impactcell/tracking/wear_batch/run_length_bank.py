@@ -208,7 +208,10 @@ def threshold(false_alarm_cycles: float) -> float:
 
 
 def locate_change_point(rows: Samples, after: float, until: float) -> tuple[int, float, float]:
-    """Most probable first cycle of the change in (after, until], its size and standard deviation."""
+    """Most probable first cycle of the change in (after, until], its size and standard deviation.
+
+    Both nan where no hypothesis of a change in there is left.
+    """
     cycle, size, variance = run_length_update.change_within(records(rows), float(after), float(until))
     return int(cycle), size, math.sqrt(max(variance, 0.0))
 

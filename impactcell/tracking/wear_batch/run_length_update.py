@@ -117,14 +117,14 @@ def wear_moments(bank: Bank) -> BankMoments:
 
 @compiled
 def change_within(bank: Bank, after: float, until: float) -> tuple[float, float, float]:
-    """Give the most probable change in (after, until], its size and its variance; of all if there is none."""
+    """Give the most probable change in (after, until], its size and variance; both nan where none is left."""
     first, last = 0, len(bank)
     while first < last and bank[first].change_cycle <= after:
         first += 1
     while last > first and bank[last - 1].change_cycle > until:
         last -= 1
     if first == last:
-        first, last = 0, len(bank)
+        return until, np.nan, np.nan
     mixture = np.empty(1, bank.dtype)
     merge(bank, first, last, mixture)
     found = mixture[0]
