@@ -44,8 +44,9 @@ def track(
     Raises
     ------
     SeriesError
-        Series of different lengths, without cycles, or not in order; what is no number; a cycle that is not
-        a whole number from 0 on; batches that are none; a limit that is not one number above 0.
+        Series of different lengths, without cycles, or not in order; rows of two cells side by side; what is
+        no number; a cycle that is not a whole number from 0 on; batches that are none; a limit that is not
+        one number above 0.
 
     Examples
     --------

@@ -107,7 +107,7 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
     ------
     SeriesError
         The series has no cycles, or they are not in the order in which they were measured; cycles come again,
-        some with the same value and some with another.
+        some with the same value and some with another, or one by one with other values or batches.
     """
     cycles = [observation.cycle for observation in observations]
     falls = sum(after < before for before, after in pairwise(cycles))

@@ -104,7 +104,7 @@ def update_clock(
     is_new_session = restarted or clock.session not in (0, session)
     lag = clock.last - index
     if not is_new_session and (index == clock.last or index in clock.seen):
-        note = f"cycle {cycle} came twice, the second is ignored"
+        note = f"cycle {cycle} came again, ignored"
         return clock, CycleTiming(index, 0, 0, repeated=True, note=note)
     seen, newest = clock.seen[-reorder_limit:], clock.seen[-1]
     if not is_new_session and 0 < lag <= reorder_limit:

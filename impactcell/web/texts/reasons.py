@@ -45,6 +45,7 @@ GERMAN: Final = {
     r"the standard deviation of mu_s is (\S+), the usual one is used":
         r"die Standardabweichung von µs ist \1, die übliche wird verwendet",
     r"cycle (\d+) came twice, the second is ignored": r"Zyklus \1 kam zweimal, der zweite zählt nicht",
+    r"cycle (\d+) came again, ignored": r"Zyklus \1 kam noch einmal und zählt nicht",
     r"cycle (\d+) came 1 cycle late": r"Zyklus \1 kam einen Zyklus zu spät",
     r"cycle (\d+) came (\d+) cycles late": r"Zyklus \1 kam \2 Zyklen zu spät",
     r"cycle number (\d+) after (\d+) is in doubt, not used":

@@ -1,6 +1,7 @@
 """Cycles that come again in a series: another run of the counter, a copy, or what nobody can tell."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -66,6 +67,10 @@ def test_values_that_are_alike_by_rounding_are_another_run_still() -> None:
         [one for one in rows(counted(60)) for _ in "ab"],
         [FrictionObservation(cycle, math.nan, 0.002) for cycle in counted(60)] * 2,
         rows(counted(300), counted(300, first=1)[:2]),
+        [one for one in rows(counted(60)) for _ in "abc"],
+        # measured again here and there, and one of them five times
+        rows(sorted([*counted(300), *range(10, 300, 25), 35, 35, 35, 35])),
+        [FrictionObservation(c, mu_s, 0.002) for c in counted(60) for mu_s in (math.nan, 0.2 + 1e-4 * c)],
     ],
 )
 def test_copies_lone_repeats_and_late_cycles_are_no_run(series: list[FrictionObservation]) -> None:
@@ -76,11 +81,42 @@ def test_what_is_neither_a_copy_nor_a_run_is_refused_with_the_way_out() -> None:
     first = rows(counted(60))
     again = first[:50] + rows(counted(60), seed=7)[50:]
     told = (
-        r"cycles 1 to 60 come again, 10 of 60 with another value: leave out those that are copies, or, "
-        r"where they are another run, number them on from 61$"
+        r"cycles 1 to 60 come again, 10 of 60 with another value or batch: leave out those that are copies, "
+        r"or, where they are another run, number them on from 61$"
     )
     with pytest.raises(SeriesError, match=told):
         replay(TrackerSettings(), first + again)
+
+
+@pytest.mark.parametrize(
+    ("cycles", "told"),
+    [
+        ([cycle for cycle in counted(100) for _ in "ab"], "100 of those from 1 to 100"),
+        ([cycle for cycle in counted(20) for _ in "abc"], "20 of those from 1 to 20"),
+        ([*counted(5_000), 5_000, 5_001, 5_001, 5_002, 5_002], "3 of those from 5000 to 5002"),
+        (sorted([*counted(100), *counted(100)[::3]]), "34 of those from 1 to 100"),
+        (sorted([*counted(100), *counted(100)[::4]]), "25 of those from 1 to 97"),
+        ([1, 2, 1, 2, 3, 4, 3, 4, *range(5, 60)], "4 of those from 1 to 4"),
+    ],
+)
+def test_rows_of_two_things_side_by_side_are_refused_with_the_way_out(cycles: list[int], told: str) -> None:
+    """Else the second is left out, and with it up to half of the series and more."""
+    way_out = (
+        "with another value or batch: where the rows are of several cells, track each alone; where each is a "
+        "cycle of its own, number them on; where a cycle was measured again, keep one row of it"
+    )
+    with pytest.raises(SeriesError, match=rf"^cycles come again, {told} {way_out}$"):
+        replay(TrackerSettings(), rows(cycles))
+
+
+def test_copies_that_are_said_to_be_of_another_batch_are_none() -> None:
+    first = rows(counted(60))
+    named = [[replace(one, batch_id=name) for one in first] for name in "AB"]
+    assert [one.session for one in told_apart([*named[0], *named[1]], LIMIT)] == [1] * 60 + [2] * 60
+    with pytest.raises(SeriesError, match="60 of those from 1 to 60 with another value or batch"):
+        told_apart([one for pair in zip(*named, strict=True) for one in pair], LIMIT)
+    side_by_side = [one for pair in zip(named[0], first, strict=True) for one in pair]
+    assert told_apart(side_by_side, LIMIT) == side_by_side
 
 
 def test_who_has_said_which_session_it_is_is_believed() -> None:

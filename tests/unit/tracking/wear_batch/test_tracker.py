@@ -82,7 +82,7 @@ def test_a_shift_is_found_with_cycle_size_and_rate(config):
         ({"mu_s_std": 0.0}, "zero"),
         ({"mu_s_std": -1.0}, "standard deviation"),
         ({"mu_s_std": math.inf}, "standard deviation"),
-        ({"cycle": 49}, "came twice"),
+        ({"cycle": 49}, "came again"),
     ],
 )
 def test_a_bad_reading_is_reported_and_the_next_is_used(config, bad, why):
