@@ -2,8 +2,10 @@
 
 import csv
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
 from impactcell.cell.series_replay import whole_number_fault
@@ -11,6 +13,7 @@ from impactcell.errors import MeasurementError, SeriesError
 from impactcell.measurements.dialect import Dialect, decode, detect, split_cells
 from impactcell.measurements.numbers import is_grouped, is_missing, parse_number
 from impactcell.measurements.text_layout import is_comment
+from impactcell.measurements.units import parse_unit
 from impactcell.tracking.wear_batch import FrictionObservation
 
 COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch")
@@ -19,6 +22,8 @@ SHOT = "shot"
 """What `impactcell estimate` calls a cycle of a campaign."""
 FIRST_LINE = "cycle,mu_s,mu_s_std[,batch]"
 """In words."""
+WITHOUT_UNIT = re.compile(r"(.*\S)\s*(?:\[[-1 ]?\]|\([-1]\))")
+"""A column's name with what says that it has no unit: `mu_s [-]`."""
 DELIMITERS = (",", ";", "\t", "|")
 """What may separate cells; the header tells which."""
 SEPARATOR_LINE = "sep="
@@ -68,8 +73,13 @@ def read_series(path: Path) -> SeriesFile:
         raise SeriesError(f"{path}:1: empty; the first line is to be {FIRST_LINE}")
     delimiter, header = _header(f"{path}:{head + 1}", lines[head])
     _, decimal, _ = detect(lines[head + 1 :], Dialect(delimiter=delimiter))
-    readings, faults, is_longer = [], [], False
+    readings: list[FrictionObservation] = []
+    faults: list[str] = []
+    is_longer = False
     for line, row in _rows(path, lines, head + 1, delimiter):
+        if not (readings or faults) and _is_line_of_units(header, row):
+            faults.append(f"{path}:{line}: a line of units; leave it out")
+            continue
         cells, found = _cells(header, row)
         is_longer |= bool(found) and len(row) > len(header)
         if not found:
@@ -105,20 +115,40 @@ def _is_separator(line: str) -> bool:
 
 def _header(place: str, line: str) -> tuple[str, list[str]]:
     """Give the separator and the names of the columns."""
-    splits = []
-    for delimiter in DELIMITERS:
-        names = split_cells(line, delimiter)
-        splits.append((delimiter, [name.lower() if name.lower() in COLUMNS else name for name in names]))
+    splits = [(mark, [_column(name) for name in split_cells(line, mark)]) for mark in DELIMITERS]
     delimiter, header = max(splits, key=lambda split: len(set(COLUMNS) & set(split[1])))
     if "cycle" not in header:
-        header = ["cycle" if name.lower() == SHOT else name for name in header]
+        header = ["cycle" if name == SHOT else name for name in header]
     for name in COLUMNS[:2]:
         if name not in header:
-            raise SeriesError(f"{place}: no column `{name}`; the first line is to be {FIRST_LINE}")
+            near = _near(name, header)
+            raise SeriesError(f"{place}: no column `{name}`{near}; the first line is to be {FIRST_LINE}")
     for name in COLUMNS:
         if header.count(name) > 1:
             raise SeriesError(f"{place}: column `{name}` is there {header.count(name)} times; keep one")
     return delimiter, header
+
+
+def _column(name: str) -> str:
+    """Give the column that a name says in capital letters, or with that it has no unit; else the name."""
+    without = WITHOUT_UNIT.fullmatch(name)
+    plain = (without[1] if without else name).lower()
+    return plain if plain in (*COLUMNS, SHOT) else name
+
+
+def _near(name: str, header: Sequence[str]) -> str:
+    """Name the column that may be meant by one that is not there; empty without such."""
+    others = {other.lower(): other for other in header if other not in (*COLUMNS, "mu_k")}
+    for near in get_close_matches(name, others, n=1):
+        unit = ", and write 0.2 for 20 %" if "%" in near else ""
+        return f"; if `{others[near]}` is meant, call it so{unit}"
+    return ""
+
+
+def _is_line_of_units(header: Sequence[str], row: Sequence[str]) -> bool:
+    """Whether a row that numbers no cycle has units and nothing else."""
+    cycle = row[header.index("cycle")] if len(row) >= len(header) else "1"
+    return not cycle.isdigit() and all(parse_unit(cell) or cell.strip("[]") == "#" for cell in row if cell)
 
 
 def _rows(path: Path, lines: Sequence[str], first: int, delimiter: str) -> Iterator[tuple[int, list[str]]]:
@@ -165,9 +195,21 @@ def _number(name: str, cell: str, decimal: str) -> tuple[float, str]:
     if not cell:
         return math.nan, ""
     value = math.inf if cell.lower().lstrip("+-") in INFINITE else parse_number(cell, decimal)
+    if cell.endswith("%") and (fault := _percent_fault(name, cell)):
+        return math.nan, fault
     if value is None or is_grouped(cell, decimal):
         mark = "point" if decimal == "." else "comma"
         return math.nan, f"{name} `{cell}` is not a number with decimal {mark}; leave it empty if missing"
     if name == "mu_s_std" and (value < 0.0 or math.isinf(value)):
         return value, f"{name} `{cell}` is no standard deviation; leave it empty if it is not known"
     return value, ""
+
+
+def _percent_fault(name: str, cell: str) -> str:
+    """Say what to write for a number in percent; empty where there is none before the sign."""
+    percent = parse_number(cell.removesuffix("%").replace(",", "."))
+    if percent is None or math.isnan(percent):
+        return ""
+    share = f"{0.01 * percent:g}".replace(".", "," if "," in cell else ".")
+    of_mu_s = f", or {share} times mu_s where it is that of mu_s" if name == "mu_s_std" else ""
+    return f"{name} `{cell}` is in percent; write {share}{of_mu_s}"
