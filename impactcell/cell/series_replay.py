@@ -9,7 +9,7 @@ import numpy as np
 
 from impactcell import alarms
 from impactcell.alarms import AlarmSetState, AlarmSettings, CycleInputs, Notification
-from impactcell.alarms.rules import batch_shift
+from impactcell.alarms.rules import batch_shift, wear_limit
 from impactcell.cell import series_runs
 from impactcell.errors import SeriesError
 from impactcell.records import BatchState, Evidence, Samples, WearState
@@ -46,12 +46,16 @@ class RaisedAlarm:
         cycles after it came to see it.
     cleared_cycle : int or None
         At which its condition was over; None while it stands. A batch shift is an event, and has none.
+    may_be_renewed : bool
+        It stands, and is of a level above the limit, while friction with the present batch is below it: a
+        surface that was renewed without anybody saying so looks like that.
     """
 
     alarm: str
     cycle: int
     evidence: Evidence
     cleared_cycle: int | None = None
+    may_be_renewed: bool = False
 
     @property
     def withdrawn(self) -> bool:
@@ -170,6 +174,8 @@ def replay(settings: TrackerSettings, observations: Sequence[FrictionObservation
             raised[open_shift] = _refined(raised[open_shift], result.batch)
     if result is None:
         raise SeriesError("the series has no cycles")
+    if wear_limit.may_be_renewed(result.wear, result.batch):
+        raised = [_perhaps_renewed(alarm) for alarm in raised]
     cycle, level, level_std, batch_offset, *cycles_to_limit = np.array(course).T
     friction, friction_std = wear_batch.present_friction(settings, state, observations[-1])
     return TrackedSeries(
@@ -201,6 +207,12 @@ def _cleared(raised: RaisedAlarm, alarm_set: AlarmSetState, cycle: int) -> Raise
     """Keep the cycle at which what stood is found to be over."""
     is_over = raised.alarm != batch_shift.NAME and not alarm_set.alarm(raised.alarm).active
     return replace(raised, cleared_cycle=cycle) if is_over and raised.cleared_cycle is None else raised
+
+
+def _perhaps_renewed(raised: RaisedAlarm) -> RaisedAlarm:
+    """Keep of a level that stands above the limit that friction is below it."""
+    stands = raised.alarm == wear_limit.NAME and raised.cleared_cycle is None
+    return replace(raised, may_be_renewed=stands)
 
 
 def _refined(raised: RaisedAlarm, batch: BatchState) -> RaisedAlarm:

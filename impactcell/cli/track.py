@@ -15,7 +15,7 @@ from impactcell.cell.series_replay import RaisedAlarm, TrackedSeries, replay
 from impactcell.cli.series_file import COLUMNS, SeriesFile, read_series
 from impactcell.errors import SeriesError
 from impactcell.process.console import print_note
-from impactcell.records.uncertainty import plus_minus
+from impactcell.records.uncertainty import TOLD_STDS, plus_minus
 from impactcell.settings.plausible_tap import FRICTION
 from impactcell.tracking.wear_batch import BatchKnowledge, TrackerSettings
 from impactcell.tracking.wear_batch.input_validation import LARGEST_FRICTION
@@ -85,7 +85,9 @@ def track(
         print_note(f"{series}: mu_s: {doubt}")
     if limit is not None and (doubt := FRICTION.doubt(limit)):
         print_note(f"--limit: {doubt}")
-    text = json.dumps(_as_json(tracked)) if as_json else _as_text(tracked)
+    named = {seen.batch_id for seen in file.observations} - {None}
+    is_told = knowledge is BatchKnowledge.KNOWN and len(named) > 1
+    text = json.dumps(_as_json(tracked)) if as_json else _as_text(tracked, is_told=is_told)
     sys.stdout.write(text + "\n")
 
 
@@ -127,6 +129,7 @@ def _as_json(series: TrackedSeries) -> dict[str, object]:
                 "false_alarm_cycles": _finite(r.evidence.false_alarm_cycles),
                 "withdrawn": r.withdrawn,
                 "cleared_cycle": r.cleared_cycle,
+                "may_be_renewed": r.may_be_renewed,
             }
             for r in series.alarms
         ],
@@ -143,14 +146,16 @@ def _cycles(count: float) -> str:
     return f"{count:.0f}" if math.isfinite(count) else "never"
 
 
-def _as_text(series: TrackedSeries) -> str:
+def _as_text(series: TrackedSeries, *, is_told: bool) -> str:
     wear = series.wear
+    has_other = is_told or _has_other_batch(series)
+    alone = "" if has_other else "; no other was found"
     level = plus_minus(wear.level, wear.level_std, ".5f")
     rate = plus_minus(1e3 * wear.rate_per_cycle, 1e3 * wear.rate_std, "+.6f", ".6f")
     lines = [
         f"{series.used} cycles used",
-        f"level   {level} (95 %, as all ± below): mu_s with the first batch",
-        *_batch_lines(series),
+        f"level   {level} (95 %, as all ± below): mu_s with the first batch{alone}",
+        *(_batch_lines(series) if has_other else []),
         f"wear    {rate} per 1000 cycles",
     ]
     if math.isfinite(wear.limit):
@@ -160,6 +165,12 @@ def _as_text(series: TrackedSeries) -> str:
         lines.append(f"limit   {wear.limit:g}, cycles to it: {left}, 95 %: {low} .. {high}")
     lines.extend(_alarm_line(raised, series) for raised in series.alarms)
     return "\n".join([*lines, *_note_lines(series.notes)])
+
+
+def _has_other_batch(series: TrackedSeries) -> bool:
+    """Whether a change of batch was found, or the present one is off by more than may be none."""
+    batch = series.batch
+    return bool(_shifts(series)) or abs(batch.offset) > TOLD_STDS * batch.offset_std
 
 
 def _batch_lines(series: TrackedSeries) -> list[str]:
@@ -184,7 +195,23 @@ def _alarm_line(raised: RaisedAlarm, series: TrackedSeries) -> str:
     passed = _passed(raised, series) if raised.alarm == wear_limit.NAME else ""
     off = plus_minus(abs(evidence.size), evidence.size_std, ".5f")
     side = "above" if evidence.size > 0.0 else "below"
-    return f"{begin}{passed}level {off} {side} the limit{_end(raised, series)}"
+    end = _renewal(series) if raised.may_be_renewed else _end(raised, series)
+    return f"{begin}{passed}level {off} {side} the limit{end}"
+
+
+def _renewal(series: TrackedSeries) -> str:
+    """Say that friction is below the limit again, and how to see it so where the surface was renewed."""
+    falls = [a for a in _shifts(series) if a.evidence.size < 0.0]
+    when = f", at {falls[-1].evidence.change_cycle} say" if falls else ""
+    return (
+        f"; mu_s with the present batch is {series.friction:.5f}, below it: if the surface was "
+        f"renewed{when}, track the cycles from there on alone"
+    )
+
+
+def _shifts(series: TrackedSeries) -> list[RaisedAlarm]:
+    """Give the changes of batch that were found, and not withdrawn."""
+    return [a for a in series.alarms if a.alarm == batch_shift.NAME and not a.withdrawn]
 
 
 def _end(raised: RaisedAlarm, series: TrackedSeries) -> str:

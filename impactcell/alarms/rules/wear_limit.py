@@ -56,14 +56,23 @@ def told_level(wear: WearState) -> tuple[str, str]:
     )
 
 
-def _renewal(wear: WearState, batch: BatchState | None) -> tuple[str, str]:
-    """Say in both languages what speaks for a surface that was renewed: friction itself is below the limit.
+def may_be_renewed(wear: WearState, batch: BatchState | None) -> bool:
+    """Whether friction itself is below a limit that the level has passed.
 
     A fall that nobody told of is a batch to the tracker, and wear goes on from where it was.
     """
-    friction = wear.level if batch is None else wear.level + batch.offset
-    if not friction < min(wear.level, wear.limit - TOLD_STDS * wear.level_std):
+    return _friction(wear, batch) < min(wear.level, wear.limit - TOLD_STDS * wear.level_std)
+
+
+def _friction(wear: WearState, batch: BatchState | None) -> float:
+    return wear.level if batch is None else wear.level + batch.offset
+
+
+def _renewal(wear: WearState, batch: BatchState | None) -> tuple[str, str]:
+    """Say in both languages what speaks for a surface that was renewed."""
+    if not may_be_renewed(wear, batch):
         return "", ""
+    friction = _friction(wear, batch)
     english = f"With the present batch friction is {friction:.4f}, below the limit: if the surface has been "
     words = f"Mit der jetzigen Charge ist die Reibung {german(friction, '.4f')}, unter der Grenze: wurde die "
     return (

@@ -126,6 +126,25 @@ def test_a_warning_of_what_has_come_is_not_told_to_be_over(tmp_path, capsys):
     ]
 
 
+def test_a_surface_that_may_have_been_renewed_is_told_with_the_way_out(tmp_path, capsys):
+    """It wears by 0.012 in 200 cycles, and is renewed: the limit is reached by both wears together only."""
+    cycles = np.arange(340)
+    mu_s = 0.2 + 6e-5 * (cycles % 200) + STD * np.random.default_rng(2).normal(size=340)
+    path = write(tmp_path / "s.csv", mu_s)
+    data = run(capsys, path, limit=0.218)
+    (alarm,) = [alarm for alarm in data["alarms"] if alarm["alarm"] == "WearLimit"]
+    assert alarm["may_be_renewed"]
+    assert not any(one["may_be_renewed"] for one in data["alarms"] if one is not alarm)
+    track(path, limit=0.218)
+    (line,) = [one for one in capsys.readouterr().out.splitlines() if one.startswith("WearLimit")]
+    told = (
+        f"above the limit; mu_s with the present batch is {data['friction']:.5f}, below it: if the surface "
+    )
+    assert line.endswith(f"{told}was renewed, at 200 say, track the cycles from there on alone")
+    since = run(capsys, write(tmp_path / "since.csv", mu_s[200:], cycles=cycles[200:]), limit=0.218)
+    assert "WearLimit" not in [alarm["alarm"] for alarm in since["alarms"]]
+
+
 def test_missing_stds_missing_cycles_and_missing_values(tmp_path, capsys):
     rng = np.random.default_rng(2)
     kept = np.sort(rng.choice(600, 450, replace=False))
@@ -158,6 +177,25 @@ def test_the_text_says_what_friction_is_by_now(tmp_path, capsys):
     # with the first batch there is no other
     track(write(tmp_path / "s.csv", truth(60, at=0), batch=["A"] * 60))
     assert "now" not in capsys.readouterr().out
+
+
+def test_where_no_other_batch_was_found_there_is_one_level(tmp_path, capsys):
+    """What the tracker holds possible of a batch that it has not found is no second level; data keep it."""
+    path = write(tmp_path / "s.csv", truth(60, at=0))
+    data = run(capsys, path)
+    assert data["batch_offset"] != 0.0
+    track(path)
+    _, level, wear = capsys.readouterr().out.splitlines()
+    assert level.endswith(": mu_s with the first batch; no other was found")
+    assert wear.startswith("wear ")
+    # of one that is named how it differs is told, also where it hardly does
+    track(write(tmp_path / "s.csv", truth(60, at=0), batch=["A"] * 30 + ["B"] * 30))
+    level, batch, now = capsys.readouterr().out.splitlines()[1:4]
+    assert level.endswith(": mu_s with the first batch")
+    assert (batch[:5], now[:3]) == ("batch", "now")
+    # and of one that is far off before any would be reported
+    track(write(tmp_path / "s.csv", truth(12, step=0.05, at=6)))
+    assert "batch   +0.0" in capsys.readouterr().out
 
 
 def test_a_shift_that_was_taken_back_is_told_so(tmp_path, capsys):
