@@ -27,6 +27,7 @@ from impactcell.discrepancy.search.indistinguishability import (
 )
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.errors import CampaignError
+from impactcell.physics import Plant
 from impactcell.records import Channel
 from impactcell.settings.model_file import read_model
 from tests.between_workers import computed_once
@@ -300,3 +301,15 @@ def test_replicate_spread_is_that_of_the_scatter() -> None:
         for _ in range(200)
     ]
     assert np.sqrt(np.mean(np.square(spreads))) == pytest.approx(0.01, rel=0.05)
+
+
+def test_an_effect_of_the_plant_gives_way_to_the_one_that_is_there() -> None:
+    """Its velocity runs to the end of its range as its strength comes to nothing: no fault of the new name."""
+    plant = Plant(
+        7e5, 450.0, 0.2, 0.15,
+        effects={"stribeck_friction": {"friction_increase": 0.02, "stribeck_velocity_m_s": 0.05}},
+    )  # fmt: skip
+    found = investigate(make("quadratic_drag"), plant=plant, library=("quadratic_drag", "viscous_friction"))
+    assert answer(found) == ("named", {"quadratic_drag"})
+    assert found.conclusion.remaining.explained
+    assert is_at_bound(found.problem.shots, found.final)

@@ -99,9 +99,8 @@ def _told_beside_terms(
 
     Where the likeliest leaves something, its term is given more pieces.
     """
-    beside = [
-        model for model in beside_terms(context, forms) if not is_at_bound(context.problem.shots, model.fit)
-    ]
+    shots, given = context.problem.shots, forms.rough.effects
+    beside = [model for model in beside_terms(context, forms) if not is_at_bound(shots, model.fit, given)]
     if not beside:
         return None
     best = max(beside, key=lambda model: model.score)

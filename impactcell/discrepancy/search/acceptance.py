@@ -148,7 +148,7 @@ def accept_set(
     """
     nominal, final = evidence
     best = sets[0].fit
-    if is_at_bound(problem.shots, best):
+    if is_at_bound(problem.shots, best, nominal.fit.effects):
         return reject(nominal, final, alternatives)
     place = {effect: index for index, effect in enumerate(order)}
     new_effects = best.effects[len(nominal.fit.effects) :]
@@ -181,7 +181,7 @@ def accept_plausible(
     rivals: whoever is behind by less than that is tied.
     """
     best = singles[0].fit
-    if context.floor_is_certain or is_at_bound(context.problem.shots, best):
+    if context.floor_is_certain or is_at_bound(context.problem.shots, best, nominal.fit.effects):
         return None
     shots, coarse = context.problem.shots, context.coarse.shots
     size = shots.values.size

@@ -3,7 +3,7 @@
 A few Gauss-Newton steps on few samples tell who cannot win; the likeliest run to the end, on all samples.
 """
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,16 +66,22 @@ class FitTask:
             return None
 
 
-def is_at_bound(shots: ShotSet, model: Fit) -> bool:
+def is_at_bound(shots: ShotSet, model: Fit, given: Container[str] = ()) -> bool:
     """Whether the shape of an effect was fitted to the end of its range, or to where no shot has been.
 
     It is then used for something that it is not: a patch wider than any slide, or far beyond its end, is a
     gradient of friction, and so is a wave of less than half a period.
+
+    Parameters
+    ----------
+    given : container of str
+        Effects that the nominal plant has: the shape of one runs off as its strength comes to nothing, where
+        a better name takes its place.
     """
     low, high = shots.visited_m
     span = high - low
     for coordinate, theta in zip(model.coordinates, model.theta.tolist(), strict=True):
-        if not coordinate.effect or coordinate.definition is None:
+        if not coordinate.effect or coordinate.effect in given or coordinate.definition is None:
             continue
         kind, value = coordinate.definition.kind, coordinate.value(theta)
         is_unseen = {
@@ -98,7 +104,7 @@ def prefer_interior(problem: Problem, nominal: Fit, ranking: list[CandidateFit])
     Or, alone beside the nominal model, if it leaves more by a small part of the gap at most: what a shape at
     its end makes of the rest is no name.
     """
-    if not ranking or not is_at_bound(problem.shots, ranking[0].fit):
+    if not ranking or not is_at_bound(problem.shots, ranking[0].fit, nominal.effects):
         return ranking
     best = ranking[0].fit
     squares = {id(one): float(one.residual @ one.residual) for one in (nominal, *(c.fit for c in ranking))}
@@ -107,7 +113,7 @@ def prefer_interior(problem: Problem, nominal: Fit, ranking: list[CandidateFit])
 
     def comes_first(candidate: CandidateFit) -> bool:
         lead = squares[id(candidate.fit)] - squares[id(best)]
-        return not is_at_bound(problem.shots, candidate.fit) and (
+        return not is_at_bound(problem.shots, candidate.fit, nominal.effects) and (
             are_indistinguishable(problem, ranking[0], candidate)
             or (is_single and lead <= POLICY.max_bound_lead * gap)
         )
@@ -156,13 +162,13 @@ def run_tasks(context: SearchContext, tasks: Sequence[FitTask]) -> list[Fit]:
     return [fitted for fitted in context.mapper(FitTask.run, tasks) if fitted is not None]
 
 
-def finalists(context: SearchContext, rough: list[Fit]) -> list[Fit]:
+def finalists(context: SearchContext, rough: list[Fit], given: Container[str] = ()) -> list[Fit]:
     """Keep the likeliest, as many inside their range, and those that fewer samples do not tell from it."""
     in_sample = [
         CandidateFit(candidate, candidate.log_likelihood(context.coarse.shots))
         for candidate in rough[: POLICY.max_finalists]
     ]
-    inside = [one for one in in_sample if not is_at_bound(context.coarse.shots, one.fit)]
+    inside = [one for one in in_sample if not is_at_bound(context.coarse.shots, one.fit, given)]
     kept = [*in_sample[: POLICY.min_finalists], *inside[: POLICY.min_finalists]]
     return [
         candidate.fit

@@ -51,7 +51,11 @@ def accept_dominant(
     candidates = [*singles, *_inside_best_pair(context, nominal.fit, pairs)]
     left = {id(single): estimate_model_error(context.problem, single.fit) for single in candidates}
     candidates.sort(key=lambda single: left[id(single)].excess)
-    inside = [single for single in candidates if not is_at_bound(context.problem.shots, single.fit)]
+    inside = [
+        single
+        for single in candidates
+        if not is_at_bound(context.problem.shots, single.fit, nominal.fit.effects)
+    ]
     if not inside:
         return None
     best = inside[0].fit

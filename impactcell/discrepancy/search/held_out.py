@@ -79,7 +79,7 @@ class OpenedShots:
         changes = confirmed(
             measure, held_nested, max_p, lambda effects: training.gap(nested.models[effects]).trace
         )
-        if is_at_bound(problem.shots, nested.models[frozenset(changes)]):
+        if is_at_bound(problem.shots, nested.models[frozenset(changes)], nested.nominal.effects):
             changes = {}
         nominal, held_nominal = nested.nominal, held_nested.nominal
         final, held_final = nested.models[frozenset(changes)], held[frozenset(changes)]

@@ -138,7 +138,9 @@ def _fit_beside(
     new = [fitted for fitted in _likeliest(context, [*before, *screened]) if fitted not in before]
     refined = refine(context, new)
     rough = _likeliest(context, [*before, *refined])
-    last = fit_all_samples(context, [one for one in finalists(context, rough) if one not in before])
+    last = fit_all_samples(
+        context, [one for one in finalists(context, rough, state.nominal.effects) if one not in before]
+    )
     converged, stuck = converge(context, last, state.smaller(size))
     return replace(
         merge(context, state, size, converged),
