@@ -304,7 +304,7 @@ def test_replicate_spread_is_that_of_the_scatter() -> None:
 
 
 def test_an_effect_of_the_plant_gives_way_to_the_one_that_is_there() -> None:
-    """Its velocity runs to the end of its range as its strength comes to nothing: no fault of the new name."""
+    """Its velocity runs to its end as its strength comes to nothing: no fault of the new name."""
     plant = Plant(
         7e5, 450.0, 0.2, 0.15,
         effects={"stribeck_friction": {"friction_increase": 0.02, "stribeck_velocity_m_s": 0.05}},
