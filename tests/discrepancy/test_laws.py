@@ -72,7 +72,11 @@ def test_result_report_and_effect_file_say_the_same(found: DiscrepancyResult, tm
     assert outcome["law_refused"] is None
     assert [path.name for path in tmp_path.glob("law_of_*.py")] == [law["file"]]
     page = (tmp_path / "report.html").read_text()
-    assert "A law that nobody had listed" in page
+    assert law["term"] == "quadratic_drag"
+    assert "What would explain the rest: quadratic drag" in page
+    assert (
+        "Was den Rest erklären würde: Quadratischer Widerstand" in (tmp_path / "report.de.html").read_text()
+    )
     assert law["file"] in page
     space: dict[str, object] = {}
     exec((tmp_path / law["file"]).read_text(), space)

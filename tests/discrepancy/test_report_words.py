@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from impactcell.discrepancy.data import ReplicateSpread
 from impactcell.discrepancy.report import figures, german_sentences, machine_sentences, sentences
 from impactcell.discrepancy.search.gap import Gap, Part
 from impactcell.discrepancy.search.gap_measure import GapChange
@@ -82,7 +83,7 @@ def test_effects_are_told_in_a_row(effects: list[str], english: str, german: str
     assert german in german_headline(document)
 
 
-def proposed(functional_form: str) -> Any:
+def proposed(functional_form: str, listed: str = "") -> Any:
     """A law over a column of shots.csv, as a result has it."""
     form = SimpleNamespace(
         second="",
@@ -96,7 +97,7 @@ def proposed(functional_form: str) -> Any:
             refused="",
             term=SimpleNamespace(form=form),
             change=SimpleNamespace(parts=(), before=gap, after=gap),
-            proposed=SimpleNamespace(functional_form=functional_form),
+            proposed=SimpleNamespace(functional_form=functional_form, listed=listed),
         )
     )
 
@@ -108,6 +109,12 @@ def proposed(functional_form: str) -> Any:
 def test_a_law_is_told_as_one_would_say_it(functional_form: str, how: str) -> None:
     said = sentences._proposed(proposed(functional_form))
     assert said.startswith(f" With s in mu (1 + s(temperature_c)) {how}, a law that no library has, the fric")
+
+
+def test_a_law_of_the_library_is_told_by_its_name() -> None:
+    said = sentences._proposed(proposed("u", "quadratic_drag"))
+    assert ", quadratic drag, which is not named, the friction" in said
+    assert "no library" not in said
 
 
 @pytest.mark.parametrize(
@@ -123,7 +130,10 @@ def test_a_law_is_told_as_one_would_say_it(functional_form: str, how: str) -> No
 )
 def test_nobody_is_asked_for_more_values_of_what_has_no_more(depends_on: tuple[str, ...], said: str) -> None:
     result: Any = SimpleNamespace(
-        conclusion=SimpleNamespace(verdict="unknown", remaining=SimpleNamespace(explained=False)),
+        conclusion=SimpleNamespace(
+            verdict="unknown", unconfirmed=(), remaining=SimpleNamespace(explained=False)
+        ),
+        replicates=ReplicateSpread(0.01, 9),
         unexplained=SimpleNamespace(phase="free_slide", depends_on=depends_on),
         per_kilogram=False,
     )

@@ -11,7 +11,7 @@ from impactcell.discrepancy.laws.effect_file import effect_file
 from impactcell.discrepancy.laws.grammar import WAVES, Shape, evaluate, name
 from impactcell.numerics.formula import compile_formula
 from impactcell.physics import Effect, LawKind
-from impactcell.physics.effects import add_effect
+from impactcell.physics.effects import LIBRARY, add_effect
 from impactcell.physics.free_column_forms import printed
 from impactcell.physics.free_form import FreeForm
 from impactcell.records import Samples
@@ -20,6 +20,16 @@ SUFFIX = {
     "1": "", "m": "_m", "m/s": "_m_s", "s": "_s", "N": "_n", "N s/m": "_n_s_per_m", "N/m": "_n_per_m",
 }  # fmt: skip
 """How a parameter's name ends for each unit."""
+LISTED = {
+    ("free_drag_over_speed", "1"): "viscous_friction",
+    ("free_drag_over_speed", "u"): "quadratic_drag",
+    ("free_friction_over_speed", "exp(-(u/l)^2)"): "stribeck_friction",
+    ("free_friction_over_position", "u"): "position_dependent_friction",
+    ("free_force_over_position", "u"): "restoring_force",
+    ("free_damping_over_indentation", "u"): "hunt_crossley_damping",
+    ("free_reading_over_force", "1"): "force_sensor_gain",
+}
+"""Effects of the library by the place and the form of a law that is one of them."""
 MANY = 1e3
 """Times its first value: how far an amplitude or scale may be looked for."""
 
@@ -82,6 +92,14 @@ class Law:
     def is_wave(self) -> bool:
         """Whether two terms are one wave of any phase."""
         return self.functional_form == " + ".join(sorted(WAVES))
+
+    @property
+    def listed(self) -> str:
+        """Effect of the library that it is; empty where it is none, or one of the wrong sign."""
+        identifier = LISTED.get((self.place.place, self.functional_form), "")
+        strength = self.parameters[0].first
+        is_wrong = bool(identifier) and strength < 0.0 <= LIBRARY[identifier].parameters[0].lower
+        return "" if is_wrong else identifier
 
     @property
     def equation(self) -> str:

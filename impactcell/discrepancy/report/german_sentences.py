@@ -212,6 +212,7 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
     ]
     return told | {
         "equation": equation(told["equation"]),
+        "listed": phrase(law.listed) if (law := result.law.proposed) and law.listed else None,
         "refused": reason(result.law.refused) if result.law.refused else None,
         "subject": "die Streuung der Reibungsfaktoren" if of_factors else "die Verläufe",
         "tested": written(" und ".join(tested)),

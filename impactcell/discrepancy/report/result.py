@@ -162,6 +162,7 @@ def _law(result: DiscrepancyResult) -> dict[str, Any]:
         "covariates": list(form.covariates),
         "form": SPLINE_ONLY if law is None else law.functional_form,
         "equation": form.effect.equation if law is None else law.equation,
+        "term": (law.listed or None) if law else None,
         "parameters": {} if law is None else _parameters([one for one in estimates if one.effect == effect]),
         "equivalents": [item.law.functional_form for item in finding.equivalents],
         "rival_places": [find_effect(place).equation for place in finding.rival_places],

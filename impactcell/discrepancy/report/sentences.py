@@ -71,7 +71,8 @@ def _proposed(result: DiscrepancyResult) -> str:
         function = finding.proposed.functional_form
         is_proportional = function == "u" and not form.second
         how = f"in proportion to the {u}" if is_proportional else f"as {function} of {letters}, the {u}"
-        how += ", a law that no library has"
+        listed = finding.proposed.listed
+        how += f", {phrase(listed)}, which is not named" if listed else ", a law that no library has"
     return f" With s in {form.effect.equation} {how}, the {fall}."
 
 
@@ -165,6 +166,7 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
     return {
         "refused": reason(finding.refused) if finding.refused else None,
         "equation": form.effect.equation if law is None else law.equation,
+        "listed": phrase(law.listed) if law and law.listed else None,
         "spline_only": law is None,
         "subject": "spread of the friction factors" if form.is_between_shots else "traces",
         "before": finding.change.before.of(finding.change.parts),
