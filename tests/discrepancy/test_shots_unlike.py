@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from impactcell.campaign import Campaign, read
-from impactcell.discrepancy.data import prepare, without_unlike_shots
+from impactcell.discrepancy.data import check_campaign_units, prepare, without_unlike_shots
 from impactcell.discrepancy.data.free_slide import DECELERATION_RATIO
 from impactcell.discrepancy.data.tap import BALANCE_RATIO, SPEED_RATIO
 from impactcell.discrepancy.report import german_notes, german_sentences
@@ -104,6 +104,25 @@ def test_what_is_wrong_in_most_shots_is_refused_as_before() -> None:
     )
     with pytest.raises(CampaignError, match=r"check the unit of .* \(off by a factor of about 6e\+4\)"):
         prepare(wrong)
+
+
+@pytest.mark.parametrize("height_m", [0.05, -0.05])
+def test_a_spike_in_each_shot_hides_neither_speed_nor_sign(height_m: float) -> None:
+    """Lone samples are far off for the line's sake: the part's motion is between all others."""
+
+    def spiked(shot: Capture) -> Capture:
+        assert shot.position is not None
+        values = shot.position.values.copy()
+        values[len(values) // 2] += height_m
+        values[len(values) - 20 : len(values) - 18] += height_m
+        return replace(shot, position=replace(shot.position, values=values))
+
+    given = with_wrong(taps(), spiked, *range(1, 25))
+    check_campaign_units(given)
+    assert without_unlike_shots(given, inspect_campaign(given)) == (given, {})
+    slow = with_wrong(given, lambda shot: replace(shot, velocity_m_s=60.0 * shot.velocity_m_s), *range(1, 25))
+    with pytest.raises(CampaignError, match=r"velocity_mm_per_min \(off by a factor of about 1/60\)"):
+        check_campaign_units(slow)
 
 
 def test_few_shots_do_not_say_what_is_usual() -> None:

@@ -39,10 +39,20 @@ def check_campaign_units(campaign: Campaign) -> None:
     CampaignError
         With the columns whose unit to check.
     """
+    check_shot_units(campaign, _looked_at(without_outliers(campaign)))
+
+
+def without_outliers(campaign: Campaign) -> Campaign:
+    """Leave lone outliers out, but of a drive: a force that acts has no sample missing."""
+    if campaign.excitation is Excitation.DRIVEN:
+        return campaign
+    return replace(campaign, shots=tuple(without_spikes(shot)[0] for shot in campaign.shots))
+
+
+def _looked_at(campaign: Campaign) -> list[PreparedShot]:
+    """Make shots, or blocks, ready for a look at their ratios alone."""
     strategy = STRATEGIES[campaign.excitation]
-    captures = strategy.cut(campaign, [])
-    shots = [prepared_shot(strategy, capture, (1, 1), 0, 0) for capture, _ in captures]
-    check_shot_units(campaign, shots)
+    return [prepared_shot(strategy, capture, (1, 1), 0, 0) for capture, _ in strategy.cut(campaign, [])]
 
 
 def check_shot_units(campaign: Campaign, shots: Sequence[PreparedShot]) -> None:
@@ -74,10 +84,7 @@ def without_unlike_shots(
     if campaign.excitation is Excitation.DRIVEN:
         return campaign, {}
     strategy = STRATEGIES[campaign.excitation]
-    shots = [
-        prepared_shot(strategy, without_spikes(shot)[0], (1, 1), 0, 0)
-        for shot, _ in strategy.cut(campaign, [])
-    ]
+    shots = _looked_at(without_outliers(campaign))
     unlike = unlike_shots(shots, [strategy.unit_ratios(shot, campaign.gravity_m_s2) for shot in shots])
     if not unlike:
         return campaign, {}

@@ -14,6 +14,7 @@ from impactcell.campaign import Campaign, Excitation, from_contact
 from impactcell.discrepancy.data.campaign_checks import (
     check_shot_units,
     refuse_rotation,
+    without_outliers,
     without_unlike_shots,
 )
 from impactcell.discrepancy.data.clipped_samples import without_clipped_samples
@@ -31,7 +32,7 @@ from impactcell.discrepancy.data.prepared_shots import (
 from impactcell.discrepancy.data.shot_making import STRATEGIES, prepared_shot
 from impactcell.discrepancy.data.shots_unlike import notes_of_unlike
 from impactcell.errors import CampaignError
-from impactcell.features import noise_std, without_spikes
+from impactcell.features import noise_std
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Channel
 
@@ -96,7 +97,7 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     campaign, unlike = without_unlike_shots(campaign, data_faults)
     whole = replace(whole, shots=tuple(shot for shot in whole.shots if shot.cycle not in unlike))
     notes = [*taken, *pretrigger, *notes_of(data_faults), *notes_of_unlike(unlike)]
-    campaign = _without_spikes(campaign, notes)
+    campaign = _without_outliers(campaign, notes)
     captures = strategy.cut(campaign, notes)
     if len(captures) < MIN_SHOTS:
         message = (
@@ -161,15 +162,13 @@ def _without_taken_names(campaign: Campaign) -> tuple[Campaign, list[str]]:
     return replace(campaign, shots=shots), notes
 
 
-def _without_spikes(campaign: Campaign, notes: list[str]) -> Campaign:
-    """Leave lone outliers out, but of a drive: a force that acts has no sample missing."""
-    if campaign.excitation is Excitation.DRIVEN:
-        return campaign
-    cleaned = [without_spikes(shot)[0] for shot in campaign.shots]
-    changed = sum(after is not before for before, after in zip(campaign.shots, cleaned, strict=True))
+def _without_outliers(campaign: Campaign, notes: list[str]) -> Campaign:
+    """Leave lone outliers out, and tell of how many shots."""
+    cleaned = without_outliers(campaign)
+    changed = sum(after is not before for before, after in zip(campaign.shots, cleaned.shots, strict=True))
     if changed:
         notes.append(f"Outliers of {changed} shots are left out of the fits.")
-    return replace(campaign, shots=tuple(cleaned))
+    return cleaned
 
 
 def split_held_out(prepared: PreparedCampaign, seed: int) -> tuple[IndexArray, IndexArray]:
