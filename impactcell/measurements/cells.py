@@ -45,14 +45,20 @@ def numbers_of(
         for row, cell in enumerate(cells):
             value = parse_number(cell, decimal)
             if value is None:
-                mark = "point" if decimal == "." else "comma"
-                faults.add(
-                    lines[row],
-                    f"column {name!r}: {cell[:40]!r} is not a number with decimal {mark}; correct the cell, "
-                    f"or leave it empty",
-                )
+                faults.add(lines[row], f"column {name!r}: {_no_number(cell, decimal)}")
             else:
                 values[row] = value
     for row in np.flatnonzero(np.isinf(values))[:1].tolist():
-        faults.add(lines[row], f"column {name!r} is infinite")
+        faults.add(
+            lines[row],
+            f"column {name!r} is infinite; write the number, or leave the cell empty where there is none",
+        )
     return values
+
+
+def _no_number(cell: str, decimal: str) -> str:
+    """Say that a cell is no number, and the ways out."""
+    mark, other = ("point", "comma") if decimal == "." else ("comma", "point")
+    is_one = parse_number(cell, "," if decimal == "." else ".") is not None
+    way = f"say --decimal {other} if that is its mark, " if is_one else ""
+    return f"{cell[:40]!r} is not a number with decimal {mark}; {way}correct the cell, or leave it empty"

@@ -183,7 +183,7 @@ def _record(table: Table, place: str, shot: str, mapping: Mapping, faults: list[
         if infinite.size:
             faults.append(
                 f"{table.place(int(infinite[0]))}: column {column.name!r} is infinite, or beyond any "
-                f"measurement, in {infinite.size} rows"
+                f"measurement, in {infinite.size} rows; correct them, or have no value there"
             )
         elif column.text is not None:
             faults.append(f"{table.title}: column {column.name!r} holds text, where the {meaning} is needed")

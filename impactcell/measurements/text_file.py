@@ -25,6 +25,7 @@ from impactcell.measurements.moments import read_moments
 from impactcell.measurements.names_alone import refuse_names_alone
 from impactcell.measurements.table import Lines, MeasuredColumn, Table, unique_names
 from impactcell.measurements.text_layout import Layout, find_layout, is_comment
+from impactcell.measurements.thousands import ThousandsWatch
 from impactcell.measurements.twincat_scope import is_scope_export, read_scope_export
 from impactcell.records import Samples
 
@@ -48,7 +49,10 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
     delimiter, decimal, how = detect([line for line in lines if not is_comment(line)], given)
     layout = find_layout(lines, source, delimiter, decimal)
     limits.check_shape(source, len(lines) - layout.first_row, len(layout.names))
-    columns, numbers = _Rows(source, lines, layout, delimiter, decimal).read()
+    watch = ThousandsWatch(decimal)
+    columns, numbers = _Rows(source, lines, layout, delimiter, decimal, watch).read()
+    if given.decimal is None:
+        watch.refuse(source, layout.names)
     notes = [how, f"encoding {encoding.removesuffix('-sig')}", _where(layout)]
     skipped = len(lines) - layout.first_row - len(numbers)
     if skipped:
@@ -127,12 +131,19 @@ class _Rows:
     """Rows of a text file, parsed in chunks."""
 
     def __init__(
-        self, source: str, lines: Sequence[str], layout: Layout, delimiter: str, decimal: str
+        self,
+        source: str,
+        lines: Sequence[str],
+        layout: Layout,
+        delimiter: str,
+        decimal: str,
+        watch: ThousandsWatch,
     ) -> None:
         self._lines = lines
         self._layout = layout
         self._delimiter = delimiter
         self._decimal = decimal
+        self._watch = watch
         self._width = len(layout.names)
         self._faults = LineFaults(source)
 
@@ -189,6 +200,7 @@ class _Rows:
         cells = [row[1][place] for row in rows]
         if place not in self._layout.numeric:
             return cells
+        self._watch.look(place, cells)
         name = self._layout.names[place] or f"column {place + 1}"
         return numbers_of(cells, [number for number, _ in rows], name, self._decimal, self._faults)
 

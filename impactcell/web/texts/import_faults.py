@@ -7,6 +7,7 @@ from impactcell.german.data_faults import german_message
 from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, with_decimal_commas
 from impactcell.web.texts.fault_pattern import COLUMN, PLACE, FaultPattern
 from impactcell.web.texts.faults_between_files import FAULTS_BETWEEN_FILES
+from impactcell.web.texts.faults_of_cells import FAULTS_OF_CELLS
 from impactcell.web.texts.faults_of_taps import FAULTS_OF_TAPS
 from impactcell.web.texts.faults_of_times import FAULTS_OF_TIMES
 from impactcell.web.texts.import_notes import page_note
@@ -15,6 +16,7 @@ from impactcell.web.texts.service_faults import SERVICE_FAULTS
 FAULTS: Final = (
     *SERVICE_FAULTS,
     *FAULTS_BETWEEN_FILES,
+    *FAULTS_OF_CELLS,
     *FAULTS_OF_TIMES,
     *FAULTS_OF_TAPS,
     FaultPattern(
