@@ -20,12 +20,16 @@ from impactcell.measurements.measured_records import Record
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.recorders import of_one_recording, records_of
 from impactcell.measurements.repeated_rows import without_repeats
-from impactcell.measurements.scalars import said_beside
+from impactcell.measurements.stated_constants import (
+    has_unread_mass,
+    notes_of_stated,
+    refuse_unread_velocity,
+)
 from impactcell.measurements.table import Table
 from impactcell.measurements.taps import taps_of
 from impactcell.measurements.units import Dimension
 from impactcell.quality import Fault, copies, inspect_campaign, notes_of, refuse_unusable
-from impactcell.records import MM_PER_MIN, Capture, Channel, Samples
+from impactcell.records import Capture, Channel, Samples
 
 STANDARD_GRAVITY_M_S2 = 9.81
 """Acceleration of free fall where nothing is given; the campaign format's own default."""
@@ -63,7 +67,7 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     tables = of_one_recording(tables, mapping)
     records, notes_of_recorders = records_of(tables, mapping)
     check_channels_alike(records, mapping)
-    notes = [*notes_of_rows, *notes_of_recorders, *_said_of(tables, given)]
+    notes = [*notes_of_rows, *notes_of_recorders, *notes_of_stated(tables, records, mapping)]
     excitation = given.excitation or excitation_of(records, notes)
     _check_channels(records, mapping, excitation)
     notes += _of_sums(mapping, excitation)
@@ -71,6 +75,7 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     notes += left_empty(tables, records, mapping)
     coordinate = _coordinate(mapping, excitation)
     if excitation is Excitation.TAP:
+        refuse_unread_velocity(tables, records, mapping)
         captures, notes_of_taps = taps_of(records, given)
         notes += notes_of_taps
     else:
@@ -83,7 +88,7 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     if (position := mapping.of(ColumnMeaning.POSITION)) is not None and position.summed_up:
         captures = [_with_summed_position(capture) for capture in captures]
     if all(math.isnan(capture.mass_kg) for capture in captures):
-        notes.append(_without_mass(coordinate))
+        notes.append(_without_mass(coordinate, tables))
     if excitation is Excitation.TAP and "stroke" not in given.constants:
         notes.append(
             "no stroke is stated: the actuator is taken to halt as it loses contact; give --set stroke=1.5mm"
@@ -132,13 +137,14 @@ def _of_copies(records: Sequence[Record]) -> list[str]:
     ]
 
 
-def _without_mass(coordinate: Coordinate) -> str:
+def _without_mass(coordinate: Coordinate, tables: Sequence[Table]) -> str:
     if coordinate is Coordinate.ROTATION:
         return (
             "no inertia is stated: the base model has to say it (inertia_kg_m2); "
             'give --set "mass=0.02 kg m²" where it is not one for all'
         )
-    return "no mass is stated: it is fitted, and only friction over mass is seen; give --set mass=18.9kg"
+    stated = "stated in its unit" if has_unread_mass(tables) else "stated"
+    return f"no mass is {stated}: it is fitted, and only friction over mass is seen; give --set mass=18.9kg"
 
 
 def _of_taps_only(given: Given, excitation: Excitation) -> list[str]:
@@ -151,23 +157,6 @@ def _of_taps_only(given: Given, excitation: Excitation) -> list[str]:
     if not names:
         return []
     return [f"given, and not used, for it is of taps: {', '.join(names)} (--excitation tap says otherwise)"]
-
-
-def _said_of(tables: Sequence[Table], given: Given) -> list[str]:
-    """Tell what was read of mass and velocity beside the columns, where nothing else was given."""
-    said = [said_beside(table) for table in tables]
-    told = []
-    for meaning, factor, unit in (
-        (ColumnMeaning.MASS, 1.0, "kg"),
-        (ColumnMeaning.VELOCITY, 1.0 / MM_PER_MIN, "mm/min"),
-    ):
-        if str(meaning) in given.constants:
-            continue
-        values = [value for of in said if isinstance(value := of.get(meaning), float)]
-        if values:
-            low, high = factor * min(values), factor * max(values)
-            told.append(f"{meaning} {low:.6g}{'' if low == high else f' to {high:.6g}'} {unit}")
-    return [f"the lines beside the columns say: {', '.join(told)}"] if told else []
 
 
 def _of_sums(mapping: Mapping, excitation: Excitation) -> list[str]:

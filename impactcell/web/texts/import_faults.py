@@ -32,6 +32,21 @@ FAULTS: Final = (
         "Stöße angeben",
     ),
     FaultPattern(
+        r"the line (['\"])(?P<line>.+)\2 says (?P<text>.+) without a unit and is not used; write it as .*",
+        "the line “{line}” says {text} without a unit and is not used; write it with its unit, or give it "
+        "for all shots in the form below",
+        "die Zeile „{line}“ sagt {text} ohne Einheit und zählt nicht; mit Einheit schreiben oder unten im "
+        "Formular für alle Stöße angeben",
+    ),
+    FaultPattern(
+        r"the line (['\"])(?P<line>.+)\2 says (?P<text>.+), which is no (?P<meaning>\w+), and is not used; "
+        r"write it as .*",
+        "the line “{line}” says {text}, which is no {meaning}, and is not used; write it in its unit, or "
+        "give it for all shots in the form below",
+        "die Zeile „{line}“ sagt {text}, keine passende Einheit, und zählt nicht; in einer passenden "
+        "schreiben oder unten im Formular für alle Stöße angeben",
+    ),
+    FaultPattern(
         r"channel (['\"])(?P<column>.+)\2 of group (['\"])(?P<group>.+)\4 does not say at which moment .*",
         "channel “{column}” of group “{group}” does not say at which moment it begins, where others of the "
         "file begin at different ones; give it its wf_start_time, or export all with one time",

@@ -73,6 +73,20 @@ GERMAN: Final = {
         "keine Messwerte vor dem Kontakt: es gilt das t = 0 der Aufzeichnungen",
     r"no stroke is stated: the actuator is taken to halt as it loses contact":
         "kein Hub angegeben: der Antrieb gilt als angehalten, wenn der Kontakt endet",
+    r"no mass is stated in its unit: it is fitted, and only friction over mass is seen":
+        "keine Masse mit ihrer Einheit angegeben: sie wird angepasst, zu sehen ist nur Reibung durch Masse",
+    r"(\w+) (\S+ \S+), as given, goes before what the files say: (.+)":
+        r"angegeben, und es gilt: \1 \2; in den Dateien steht \3",
+    r"(\w+) (\S+ \S+), as given, goes before what the files say without a unit: (.+)":
+        r"angegeben, und es gilt: \1 \2; in den Dateien steht ohne Einheit \3",
+    r"the line (['\"])(.+)\1 says (.+) without a unit and is not used, in 1 file":
+        r"die Zeile „\2“ sagt \3 ohne Einheit und zählt nicht, in 1 Datei",
+    r"the line (['\"])(.+)\1 says (.+) without a unit and is not used, in (\d+) files, the first (.+)":
+        r"die Zeile „\2“ sagt \3 ohne Einheit und zählt nicht, in \4 Dateien, zuerst in \5",
+    r"the line (['\"])(.+)\1 says (.+), which is no \w+, and is not used, in 1 file":
+        r"die Zeile „\2“ sagt \3, keine passende Einheit, und zählt nicht, in 1 Datei",
+    r"the line (['\"])(.+)\1 says (.+), which is no \w+, and is not used, in (\d+) files, the first (.+)":
+        r"die Zeile „\2“ sagt \3, keine passende Einheit, und zählt nicht, in \4 Dateien, zuerst in \5",
     r"no mass is stated: it is fitted, and only friction over mass is seen":
         "keine Masse angegeben: sie wird angepasst, zu sehen ist nur Reibung durch Masse",
     r"no inertia is stated: the base model has to say it \(inertia_kg_m2\)":
