@@ -219,7 +219,7 @@ def _whole(number: int, record: Record, given: Given, excitation: Excitation) ->
     position = channels["position"]
     if excitation is Excitation.DRIVEN or position is None:
         return described(number, record, given, channels)
-    direction = direction_of(record, given, position, float(position.values[:3].mean()))
+    direction = direction_of(record, given, position, float(np.median(position.values[:3])))
     return described(number, record, given, channels, direction=direction)
 
 

@@ -4,6 +4,8 @@ import math
 import re
 from collections.abc import Sequence
 
+import numpy as np
+
 from impactcell.campaign.shots import LARGEST_SHOT
 from impactcell.measurements.given_values import Given
 from impactcell.measurements.measured_records import Record
@@ -32,7 +34,7 @@ def direction_of(record: Record, given: Given, position: Channel | None, start_m
     """Give +1 or -1: as said, else to which side of `start_m` the part came to rest; else +1."""
     said = scalar(record, given, ColumnMeaning.DIRECTION)
     if math.isnan(said) and position is not None:
-        said = float(position.values[-RESTING:].mean()) - start_m
+        said = float(np.median(position.values[-RESTING:])) - start_m
     return -1.0 if said < 0.0 else 1.0
 
 

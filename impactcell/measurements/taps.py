@@ -283,6 +283,7 @@ def _start(position: Channel) -> float:
     before = position.values[position.time_s < 0.0]
     if len(before) < 3:
         before = position.values[:3]
-    place = float(np.mean(before))
+    aside = (len(before) + 1) // 4
+    place = float(np.sort(before)[aside : len(before) - aside].mean())  # no spike moves it, nor a raster
     noise = noise_of(position.values)
     return place if abs(place) > START_STD * noise / math.sqrt(len(before)) else 0.0

@@ -103,6 +103,29 @@ def test_a_spike_before_contact_hides_no_tap() -> None:
     assert shot.force.time_s[0] == pytest.approx(-0.03, abs=2e-4)
 
 
+@pytest.mark.parametrize("spiked", [100, -3])
+def test_a_spike_of_the_position_moves_neither_place_nor_direction(spiked: int) -> None:
+    """Before contact the part lies at 0 of a table that it never left; it slides 5 mm along +1."""
+    time, force, position = sampled(taps((3000,), (18.9,))[0], np.random.default_rng(6))
+    position = position - np.mean(position[time < PRETRIGGER_S])
+    spikes = position.copy()
+    spikes[spiked] -= 0.05 if spiked > 0 else 0.5
+    given = Given(constants={"mass": 18.9, "velocity": 0.05})
+    (clean,), (shot,) = (
+        make_campaign(tables, guess(tables, given)).campaign.shots
+        for tables in (
+            [table(Time=("s", time), Force=("N", force), Position=("m", values))]
+            for values in (position, spikes)
+        )
+    )
+    assert (clean.start_m, clean.direction) == (0.0, 1.0)
+    assert (shot.start_m, shot.direction) == (0.0, 1.0)
+    assert shot.position is not None
+    assert clean.position is not None
+    unlike = shot.position.values != clean.position.values
+    assert np.count_nonzero(unlike) == 1
+
+
 def test_lines_beside_the_columns_are_told_and_a_count_of_rows_is_no_covariate(tmp_path: Path) -> None:
     rng = np.random.default_rng(8)
     paths = []
