@@ -21,15 +21,16 @@ from impactcell.discrepancy.data import (
     refuse_rotation,
     without_unlike_shots,
 )
-from impactcell.errors import CampaignError
+from impactcell.errors import CampaignError, PredictionError
 from impactcell.features import Features, extract
 from impactcell.prediction import Model, estimate_from_features
 from impactcell.prediction.contact_onset import fit_plant_and_onset, is_late, onset_sentence
+from impactcell.prediction.slide_friction import friction_of_slide
 from impactcell.process.console import print_note, print_result
 from impactcell.process.progress import progress
 from impactcell.process.whole_files import write_whole
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
-from impactcell.records import FrictionEstimate, as_recorded
+from impactcell.records import FrictionEstimate, Quality, as_recorded
 
 COLUMNS = (
     "shot", "mu_s_force", "mu_s_distance", "mu_s_combined", "mu_s", "mu_s_std", "mu_k", "mu_k_std",
@@ -124,8 +125,11 @@ def _of_taps(
         plant, errors = known.model, known.settings.recorder_std
         taps = [replace(tap, capture=as_recorded(tap.capture, *errors)) for tap in taps]
     else:
-        with progress("fitting the plant", 1):
-            fitted, taps = fit_plant_and_onset(taps, campaign.gravity_m_s2)
+        try:
+            with progress("fitting the plant", 1):
+                fitted, taps = fit_plant_and_onset(taps, campaign.gravity_m_s2)
+        except PredictionError as fault:
+            return _by_slides(taps, campaign.gravity_m_s2, fault)
         plant, estimate_of = fitted.model, fitted.estimate
         if is_late(fitted, taps):
             print_note(f"{onset_sentence(fitted.onset_s)}; it is fitted with each shot")
@@ -139,6 +143,24 @@ def _of_taps(
         for tap in taps:
             rows.append((tap.capture.cycle, estimate_of(tap, model)))
             advance()
+    return rows
+
+
+def _by_slides(
+    taps: Sequence[Features], gravity_m_s2: float, fault: PredictionError
+) -> list[tuple[int, FrictionEstimate]]:
+    """Give mu_k of taps to which no plant could be fitted, by their slides.
+
+    Raises
+    ------
+    PredictionError
+        The fault of the fit: no slide shows friction either.
+    """
+    taps = [replace(tap, capture=as_recorded(tap.capture)) for tap in taps]
+    rows = [(tap.capture.cycle, friction_of_slide(tap, gravity_m_s2)) for tap in taps]
+    if all(row.mu_k.quality is Quality.BAD for _, row in rows):
+        raise fault
+    print_note(f"no plant could be fitted, mu_k alone is given, by the slides: {fault}")
     return rows
 
 

@@ -15,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from impactcell.errors import ClippedForceError
 from impactcell.features.channels import MIN_MOTION_STD, rest_samples
 from impactcell.features.contact import MIN_CONTACT_STD
 from impactcell.features.extraction import Features
@@ -72,6 +73,8 @@ def _sign_of_position(features: Features) -> str:
 def _balance(features: Features) -> str:
     slide, force, mass_kg = features.slide, features.force, features.capture.mass_kg
     if isinstance(slide, Exception) or isinstance(force, Exception):
+        return ""
+    if isinstance(features.peak_force, ClippedForceError):  # what is cut off lacks in the impulse
         return ""
     braking, distance = slide.deceleration.value, slide.distance.value
     if not (mass_kg > 0.0 and braking > 0.0 and distance > 0.0):

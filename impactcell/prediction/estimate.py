@@ -19,6 +19,7 @@ from impactcell.prediction.linearised_model import FORCE_SCALE, MASS, PARAMETERS
 from impactcell.prediction.mass_interpolation import interpolate_mass
 from impactcell.prediction.model import Model
 from impactcell.prediction.phase_reweighting import MISFIT_THRESHOLD
+from impactcell.prediction.slide_friction import coefficient_of_slide
 from impactcell.prediction.waveform import WaveformFit, deceleration_friction, fit
 from impactcell.records import MM_PER_MIN, Capture, Coefficient, Estimator, FrictionEstimate, Quality
 
@@ -278,12 +279,10 @@ def _mu_k(model: Model, slide: SlideFeatures | None, mu_s: Coefficient, capture:
     """mu_k from the mean deceleration of the slide, or, without one, from mu_s through the ratio.
 
     A slide knows nothing of what a model lacks in the contact, where a waveform bends mu_k by a third for
-    0.1 ms of delay. What friction does along the slide and the position's scale widen its std.
+    0.1 ms of delay.
     """
     if slide is not None and (value := deceleration_friction(model, capture.mass_kg, slide)) > 0.0:
-        noise = math.hypot(slide.deceleration.std, slide.bend) / model.plant.gravity_m_s2
-        std = math.hypot(noise, capture.position_scale_std * value)
-        return Coefficient(value, std, Quality.UNCERTAIN, "from the mean deceleration of the slide")
+        return coefficient_of_slide(value, slide, capture, model.plant.gravity_m_s2)
     if mu_s.quality < Quality.BAD:
         ratio = model.ratio
         std = ratio * math.hypot(mu_s.std, mu_s.value * model.prior.ratio_std / ratio)

@@ -111,6 +111,8 @@ GERMAN: Final = {
         r"µk hängt von der Richtung ab: \1 in \2 Aufzeichnungen in Richtung +1, \3 in \4 in Richtung -1: die "
         "Reibung ist richtungsabhängig, oder die Fläche liegt nicht waagrecht; ein Mittel über beide ist "
         "keines von beiden",
+    r"no plant could be fitted, mu_k alone is given, by the slides: .*":
+        "es ließ sich kein Modell anpassen, es bleibt µk aus dem Gleiten; warum, steht bei jedem Stoß",
     r"named '(.+)', unit fits": r"heißt „\1“, Einheit passt",
     r"named '(.+)'": r"heißt „\1“",
     r"the only column in (\S+)": r"einzige Spalte in \1",

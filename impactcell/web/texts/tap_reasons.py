@@ -59,6 +59,7 @@ TAP_REASONS: Final[Mapping[str, str]] = {
     r"as if first contact lay (\S+) µs before t = 0: check the trigger":
         r"als läge der erste Kontakt \1 µs vor t = 0: den Trigger prüfen",
     r"from the mean deceleration of the slide": "aus der mittleren Verzögerung des Gleitens",
+    r"no plant could be fitted to these taps": "an diese Stöße ließ sich kein Modell anpassen",
     r"through mu_k/mu_s of the model": "über µk/µs des Modells",
     r"by sliding distance only: (.+)": r"nur aus dem Gleitweg: \1",
     r"by peak force only: (.+)": r"nur aus der Spitzenkraft: \1",

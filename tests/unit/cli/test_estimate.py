@@ -15,7 +15,7 @@ from impactcell.campaign import Campaign, Excitation, Sensor, write
 from impactcell.campaign import read as read_campaign
 from impactcell.cli.direction_note import note_of_direction
 from impactcell.cli.estimate import COLUMNS, estimate
-from impactcell.errors import CampaignError, PredictionError
+from impactcell.errors import CampaignError, NotConvergedError, PredictionError
 from impactcell.records import Capture, Channel
 from impactcell.web.texts.import_notes import page_note
 from impactcell.web.texts.reasons import german_reason
@@ -274,6 +274,44 @@ def test_why_a_slide_shows_no_friction_is_in_its_row(tmp_path: Path) -> None:
     row = rows(tmp_path / "o.csv")[2]
     assert (row["mu_k_quality"], row["gap"]) == ("bad", "")
     assert row["reason"].endswith("the position record has only 5 samples")
+
+
+@pytest.mark.parametrize("share", [0.9, 0.4])
+def test_where_all_forces_are_clipped_the_slides_show_mu_k(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], share: float
+) -> None:
+    made = taps()
+    shots = []
+    for shot in captures(made):
+        assert shot.force is not None
+        values = np.minimum(shot.force.values, share * shot.force.values.max())
+        shots.append(replace(shot, force=replace(shot.force, values=values)))
+    estimate(campaign(tmp_path / "c", shots), None, tmp_path / "out.csv")
+    for row, tap in zip(rows(tmp_path / "out.csv"), made, strict=True):
+        assert float(row["mu_k"]) == pytest.approx(tap.mu_k, rel=5e-3)
+        assert abs(float(row["mu_k"]) - tap.mu_k) < 3.0 * float(row["mu_k_std"])
+        assert (row["mu_s"], row["quality"], row["mu_k_quality"]) == ("", "bad", "uncertain")
+        assert row["estimator"] == "none"
+        assert re.search(r"force samples in a row stand at .* N: clipped", row["reason"])
+        assert "abgeschnitten" in german_reason(row["reason"])
+    (note,) = [line for line in capsys.readouterr().err.splitlines() if "no plant" in line]
+    assert "by the slides: no tap of the campaign can be used; shot 1: " in note
+    assert page_note(note, "de")[0] == "de"
+
+
+def test_taps_that_no_plant_makes_show_mu_k_by_their_slides(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fit(*_: object) -> None:
+        raise NotConvergedError("no k, b and mu_k/mu_s explain its taps")
+
+    monkeypatch.setattr("impactcell.cli.estimate.fit_plant_and_onset", fit)
+    made = taps()
+    estimate(campaign(tmp_path / "c", captures(made)), None, tmp_path / "out.csv")
+    for row, tap in zip(rows(tmp_path / "out.csv"), made, strict=True):
+        assert float(row["mu_k"]) == pytest.approx(tap.mu_k, rel=5e-3)
+        assert float(row["peak_force_n"]) > 0.0
+        assert german_reason(row["reason"]) == "an diese Stöße ließ sich kein Modell anpassen"
 
 
 def test_what_cannot_be_used_is_named(tmp_path: Path) -> None:
