@@ -229,6 +229,7 @@ class LinearisedModel:
         """Give z = ln(mu_s m g / (b v)); positive if static friction bears the first contact force."""
         return float(self.kink_form @ theta) + math.log(self._weight_n / self.tap.velocity_m_s)
 
+    @np.errstate(over="ignore", divide="ignore", invalid="ignore")  # what is not finite is raised
     def linearise(self, theta: Samples, side: int = 0, beyond: float = 0.0) -> Linearisation:
         """Residuals and their normal equations at `theta`.
 
