@@ -19,6 +19,7 @@ from impactcell.prediction.free_slide_friction import (
     fit_free_slide,
     free_slide_friction,
     is_missed,
+    misfit,
 )
 from impactcell.process.console import print_note
 from impactcell.records import Capture, Coefficient, Estimator, FrictionEstimate, as_recorded
@@ -118,5 +119,4 @@ def _with_noise_of_all(shots: Sequence[Capture]) -> list[Capture]:
 
 
 def _residuals(fits: Sequence[FreeSlideFit]) -> str:
-    gap = math.sqrt(sum(one.gap**2 for one in fits) / len(fits))
-    return f"residuals are {gap:.3g} times the noise; run `impactcell discrepancy`"
+    return f"residuals by eighths of a slide are {misfit(fits):.3g} times noise; run `impactcell discrepancy`"

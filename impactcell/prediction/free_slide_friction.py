@@ -125,6 +125,11 @@ def fit_free_slide(capture: Capture, gravity_m_s2: float, plant: Plant | None = 
     )
 
 
+def misfit(fits: Sequence[FreeSlideFit]) -> float:
+    """RMS of the means of residuals over intervals of slides, 1 = noise."""
+    return math.sqrt(sum(one.chi2 for one in fits) / sum(one.freedom for one in fits))
+
+
 def is_missed(fits: Sequence[FreeSlideFit]) -> bool:
     """Whether the residuals of slides, taken together, are more than noise makes them."""
     chi2, freedom = sum(one.chi2 for one in fits), sum(one.freedom for one in fits)

@@ -12,14 +12,18 @@ TAP_REASONS: Final[Mapping[str, str]] = {
         r"das Modell trifft diesen Stoß nicht: die Abweichung ist \1-mal das Rauschen",
     r"the model misses these taps: residuals are (\S+) times the noise":
         r"das Modell trifft diese Stöße nicht: die Abweichung ist \1-mal das Rauschen",
-    r"the model misses this slide: residuals are (\S+) times the noise":
-        r"das Modell trifft diesen Gleitvorgang nicht: die Abweichung ist \1-mal das Rauschen",
-    r"the model misses these slides: residuals are (\S+) times the noise":
-        r"das Modell trifft diese Gleitvorgänge nicht: die Abweichung ist \1-mal das Rauschen",
-    r"constant friction misses this slide: residuals are (\S+) times the noise":
-        r"gleichbleibende Reibung trifft diesen Gleitvorgang nicht: die Abweichung ist \1-mal das Rauschen",
-    r"constant friction misses these slides: residuals are (\S+) times the noise":
-        r"gleichbleibende Reibung trifft diese Gleitvorgänge nicht: die Abweichung ist \1-mal das Rauschen",
+    r"the model misses this slide: residuals by eighths of a slide are (\S+) times noise":
+        r"das Modell trifft diesen Gleitvorgang nicht: die Abweichung, über Achtel gemittelt, "
+        r"ist \1-mal das Rauschen",
+    r"the model misses these slides: residuals by eighths of a slide are (\S+) times noise":
+        r"das Modell trifft diese Gleitvorgänge nicht: die Abweichung, über Achtel gemittelt, "
+        r"ist \1-mal das Rauschen",
+    r"constant friction misses this slide: residuals by eighths of a slide are (\S+) times noise":
+        r"gleichbleibende Reibung trifft diesen Gleitvorgang nicht: die Abweichung, über Achtel gemittelt, "
+        r"ist \1-mal das Rauschen",
+    r"constant friction misses these slides: residuals by eighths of a slide are (\S+) times noise":
+        r"gleichbleibende Reibung trifft diese Gleitvorgänge nicht: die Abweichung, über Achtel gemittelt, "
+        r"ist \1-mal das Rauschen",
     r"run `impactcell discrepancy`": "`impactcell discrepancy` ausführen",
     r"a free slide shows mu_k only": "freies Gleiten zeigt nur µk",
     r"the model does not make this tap: (.+)": r"das Modell ergibt diesen Stoß nicht: \1",
