@@ -83,7 +83,7 @@ def lacking(
     told: AbstractSet[ColumnMeaning] = frozenset(),
 ) -> list[str]:
     """Say what has to be given first; nothing of the quantities whose lack has been `told` already."""
-    faults = [fault for item in assignments for fault in _of_column(item)]
+    faults = [fault for item in assignments for fault in _of_column(item, _written_unit(item, tables))]
     faults += _contradictions(assignments)
     present = {*told, *(item.meaning for item in assignments)}
     if ColumnMeaning.TIME not in present and any(
@@ -112,12 +112,18 @@ def _or_encoding(tables: Sequence[Table]) -> str:
     return ""
 
 
-def _of_column(item: Assignment) -> list[str]:
+def _written_unit(item: Assignment, tables: Sequence[Table]) -> str:
+    """Give what the first table that has a column writes as its unit; empty where it writes none."""
+    columns = (table.column(item.column) for table in tables)
+    return next((column.unit or "" for column in columns if column is not None), "")
+
+
+def _of_column(item: Assignment, written: str) -> list[str]:
     if item.meaning in UNITLESS:
         return []
     faults = []
     if item.unit is None:
-        faults.append(no_unit(item))
+        faults.append(no_unit(item, written))
     elif item.unit.dimension not in VOCABULARY[item.meaning].dimensions and not item.summed_up:
         faults.append(
             f"column {item.column!r} ({item.meaning}) is in {item.unit.symbol}; "
@@ -131,19 +137,23 @@ def _of_column(item: Assignment) -> list[str]:
     return faults
 
 
-def no_unit(item: Assignment) -> str:
-    """Say that a column has no unit, and which it may be."""
+def no_unit(item: Assignment, written: str) -> str:
+    """Say that a column has no unit, or has `written` one that is not known, and which it may be."""
     rotates = name_score(item.column, item.meaning)[1] in ROTATION_WORDS
     unit = VOCABULARY[item.meaning].dimensions[1 if rotates else 0].value
+    lack = f"is in {written!r}, no unit that is known" if written else "has no unit"
     return (
-        f"column {item.column!r} ({item.meaning}) has no unit; say --unit '{item.column}={unit}', or "
-        f"which it is"
+        f"column {item.column!r} ({item.meaning}) {lack}; say --unit '{item.column}={unit}', or which it is"
     )
 
 
 def _way_to_unit(item: Assignment, meaning: ColumnMeaning, unit: MeasuredUnit) -> str:
     """Say how a column that is in a unit of something else can be used as a quantity."""
     fitting = VOCABULARY[meaning].dimensions[0].value
+    if meaning is ColumnMeaning.FORCE and unit.dimension is Dimension.MASS:
+        weights = {"kg": "kgf", "lb": "lbf"}
+        if (of_weight := weights.get(unit.symbol.lower().removesuffix("s"))) is not None:
+            return f"say --unit '{item.column}={of_weight}' where its weight is meant, else its unit"
     way = f"give its unit with --unit '{item.column}={fitting}'"
     if meaning is ColumnMeaning.POSITION and unit.dimension in SPEED_OF.values():
         return f"say --column 'position={item.column}' to have the speed summed up, or {way}"

@@ -39,7 +39,7 @@ def without_unit(
             if item.unit is None or item.meaning in UNITLESS:
                 continue
             if measured_unit(unit_of(column, units), item.meaning, gains) is None:
-                faults.setdefault(column.name, f"{table.title}: {no_unit(item)}")
+                faults.setdefault(column.name, f"{table.title}: {no_unit(item, column.unit or '')}")
     return list(faults.values())
 
 

@@ -18,7 +18,7 @@ _CLOCK = (
     r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2}(?:[.,;]\d+)?))?(?:\s*(?P<half>[AaPp])[Mm])?"
 )
 _BEFORE_CLOCK = r",?[T ]+"
-_ZONE = r"(?:Z|(?P<ahead>[+-])(?P<zone_hour>\d{2}):?(?P<zone_minute>\d{2}))?"
+_ZONE = r"(?:Z|(?P<ahead>[+-])(?P<zone_hour>\d{2})(?::?(?P<zone_minute>\d{2}))?)?"
 """How far a clock is ahead of UTC: what is written without is not known, and taken as it is."""
 _TWO = r"(\d{1,2})"
 _DATES = (
@@ -148,5 +148,5 @@ def _ahead_s(match: re.Match[str]) -> float:
     """How far the clock of a cell is ahead of UTC [s]; 0 where it does not say."""
     if match["ahead"] is None:
         return 0.0
-    ahead = 3600.0 * int(match["zone_hour"]) + 60.0 * int(match["zone_minute"])
+    ahead = 3600.0 * int(match["zone_hour"]) + 60.0 * int(match["zone_minute"] or 0)
     return -ahead if match["ahead"] == "-" else ahead

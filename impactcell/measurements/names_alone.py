@@ -17,8 +17,13 @@ def refuse_names_alone(lines: Sequence[str], source: str) -> None:
     Raises
     ------
     MeasurementError
-        With the line of the names.
+        With the line of the names, or that its lines are those of JSON.
     """
+    if lines and re.fullmatch(r"\s*\{.*\}\s*", lines[0]):
+        raise MeasurementError(
+            f"{source}: has a JSON object in each line, which is not read; write them as one list, "
+            "[{...}, {...}], in a file that ends in .json"
+        )
     last = -1
     for index, line in enumerate(lines):
         if is_comment(line):

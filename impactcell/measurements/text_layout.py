@@ -248,7 +248,7 @@ def _header_cells(line: str, delimiter: str, width: int) -> list[str]:
 
 def _is_unit_row(cells: list[str]) -> bool:
     filled = [cell for cell in cells if cell.strip("[]() ") and cell.strip().lower() not in UNIT_LABELS]
-    known = sum(parse_unit(cell) is not None for cell in filled)
+    known = sum(parse_unit(cell) is not None and cell != "d" for cell in filled)  # d is rather a name
     return bool(filled) and known > 0.6 * len(filled)
 
 

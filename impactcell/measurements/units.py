@@ -70,6 +70,7 @@ _POUND_KG, _INCH_M, _KILOPOND_N = 0.45359237, 0.0254, 9.80665
 _FURTHER = (
     ("min", Dimension.TIME, 60.0),
     ("h", Dimension.TIME, 3600.0),
+    ("d", Dimension.TIME, 86_400.0),
     ("in", Dimension.LENGTH, _INCH_M),
     ("mil", Dimension.LENGTH, 1e-3 * _INCH_M),
     ("ft", Dimension.LENGTH, 12.0 * _INCH_M),
@@ -100,7 +101,7 @@ _WORDS = {
     "sec": "s", "second": "s", "seconds": "s", "sekunde": "s", "sekunden": "s", "msec": "ms",
     "millisekunde": "ms", "millisekunden": "ms", "millisecond": "ms", "milliseconds": "ms",
     "mikrosekunde": "us", "mikrosekunden": "us", "microsecond": "us", "microseconds": "us", "usec": "us",
-    "minutes": "min",
+    "minutes": "min", "day": "d", "days": "d", "tag": "d", "tage": "d",
     "newton": "N", "newtons": "N", "kilonewton": "kN", "newtonmeter": "Nm", "meter": "m", "metre": "m",
     "meters": "m", "metres": "m", "millimeter": "mm", "millimetre": "mm", "millimeters": "mm", "micron": "um",
     "microns": "um", "mikrometer": "um", "micrometer": "um", "inch": "in", "inches": "in", '"': "in",
@@ -111,6 +112,11 @@ _WORDS = {
     "megahertz": "MHz",
 }  # fmt: skip
 """Other writings of a unit, in lower case; of prefixes that case tells apart (mPa, MPa) `_SI` has both."""
+_IN_CAPITALS = frozenset((
+    "s", "us", "min", "mm", "cm", "um", "mil", "ft", "deg", "rad", "rev", "rpm", "kg", "lb", "kgf", "lbf",
+    "kp", "bar", "psi",
+))  # fmt: skip
+"""Units that capitals cannot confuse with others, as terse exports write them; of MS the M is also mega."""
 _RATES = {
     (Dimension.LENGTH, 1): Dimension.VELOCITY,
     (Dimension.LENGTH, 2): Dimension.ACCELERATION,
@@ -165,7 +171,9 @@ def parse_unit(text: str) -> MeasuredUnit | None:
 
 def _single(plain: str) -> MeasuredUnit | None:
     symbols = _symbols()
-    return symbols.get(plain) or symbols.get(_WORDS.get(plain.lower(), ""))
+    lower = plain.lower()
+    known = symbols.get(plain) or symbols.get(_WORDS.get(lower, ""))
+    return known or (symbols[lower] if plain.isupper() and lower in _IN_CAPITALS else None)
 
 
 def _rate(plain: str) -> MeasuredUnit | None:
@@ -245,6 +253,6 @@ def _suffix(text: str) -> tuple[str, str | None]:
         if tuple(tail) in _SPEED_SUFFIXES:
             unit = "/".join(tail)
         # What is called "u_in" goes in; where inches are meant, the name ends in "inch".
-        if parse_unit(unit) and parts[0] and unit not in ("1", "t", "h", "in"):
+        if parse_unit(unit) and parts[0] and unit not in ("1", "t", "h", "d", "in"):
             return "_".join(parts[:-count]), unit
     return text, None

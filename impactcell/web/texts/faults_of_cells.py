@@ -9,6 +9,13 @@ CELL: Final = r"(?P<mark>['\"])(?P<cell>.*)(?P=mark)"
 
 FAULTS_OF_CELLS: Final = (
     FaultPattern(
+        r"has a JSON object in each line, which is not read; .*",
+        "has a JSON object in each line, which is not read; write them as one list, [{{...}}, {{...}}], in a "
+        "file that ends in .json",
+        "hat in jeder Zeile ein JSON-Objekt, was nicht gelesen wird; als eine Liste schreiben, [{{...}}, "
+        "{{...}}], in einer Datei, die auf .json endet",
+    ),
+    FaultPattern(
         COLUMN + ": " + CELL + r" is not a number with decimal point; .*",
         "column “{column}”: “{cell}” is not a number with decimal point; correct the cell, or leave it empty",
         "Spalte „{column}“: „{cell}“ ist keine Zahl mit Dezimalpunkt; die Zelle berichtigen oder leer lassen",
@@ -17,6 +24,14 @@ FAULTS_OF_CELLS: Final = (
         COLUMN + ": " + CELL + r" is not a number with decimal comma; .*",
         "column “{column}”: “{cell}” is not a number with decimal comma; correct the cell, or leave it empty",
         "Spalte „{column}“: „{cell}“ ist keine Zahl mit Dezimalkomma; die Zelle berichtigen oder leer lassen",
+    ),
+    FaultPattern(
+        COLUMN + r" \((?P<meaning>\w+)\) is in " + CELL + r", no unit that is known; "
+        r"say --unit '.+?=(?P<unit>[^']+)'.*",
+        "column “{column}” ({meaning}) is in “{cell}”, no unit that is known; give it in the form below, "
+        "{unit} say",
+        "Spalte „{column}“ ({meaning}) ist in „{cell}“, keiner bekannten Einheit; unten im Formular angeben, "
+        "etwa {unit}",
     ),
     FaultPattern(
         COLUMN + r" is infinite; .*",

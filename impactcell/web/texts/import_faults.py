@@ -97,7 +97,7 @@ FAULTS: Final = (
         "Spalte „{column}“ ({meaning}) hat keine Einheit; unten im Formular angeben, etwa {unit}",
     ),
     FaultPattern(
-        COLUMN + r" \((?P<meaning>\w+)\) is in (?P<unit>.+?); (?:give its unit|say what that) .*",
+        COLUMN + r" \((?P<meaning>\w+)\) is in (?P<unit>.+?); (?:give its unit|say what that|say --unit) .*",
         "column “{column}” ({meaning}) is in {unit}; give its unit in the form below, or choose the "
         "right column",
         "Spalte „{column}“ ({meaning}) ist in {unit}; unten im Formular ihre Einheit angeben oder "

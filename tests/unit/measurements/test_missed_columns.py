@@ -58,7 +58,8 @@ def refused(files: Sequence[Path], out: Path, *options: str) -> str:
 @pytest.mark.parametrize("unit", ["", " [1/10 mm]"])
 def test_a_second_file_has_not_the_unit_of_the_first(unit: str, tmp_path: Path) -> None:
     files = [write(tmp_path / "a.csv"), write(tmp_path / "b.csv", f"Zeit [s];Kraft [N];Weg{unit}")]
-    told = "column 'Weg' (position) has no unit; say --unit 'Weg=m', or which it is"
+    lack = "is in '1/10 mm', no unit that is known" if unit else "has no unit"
+    told = f"column 'Weg' (position) {lack}; say --unit 'Weg=m', or which it is"
     assert refused(files[1:], tmp_path / "out") == told
     assert refused(files, tmp_path / "out") == f"{files[1]}: {told}"
     assert refused(files[::-1], tmp_path / "out") == told

@@ -145,6 +145,10 @@ def test_dates_and_clock_times_become_seconds(tmp_path: Path) -> None:
         ),
         ("Messung;5\nDatum;2026-01-07\nt [s];F [N];x [m]\n", ":3: has no samples below its names"),
         ("time_s,force_n,position_m", ":1: has no samples below its names"),
+        (
+            '{"t": 0.0, "F": 1.5}\n{"t": 0.1, "F": 2.5}\n',
+            ": has a JSON object in each line, which is not read",
+        ),
     ],
 )
 def test_faults_name_their_line(tmp_path: Path, text: str, told: str) -> None:
