@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import ssl
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -30,12 +31,16 @@ from impactcell.process.console import print_result
 from impactcell.records import MM_PER_MIN, Capture, Channel
 from impactcell.service.factory import cell_design, module_link
 from impactcell.settings import CellConfig, read_cell
+from impactcell.settings.service_files import of_module_tls
 
 ROUNDING: Final = 1e-3
 """Share by which the steps of a register may lead out of a range at whose edge the value is."""
 UNIT_FACTOR: Final = 3.0
 """Factor beside a calibrated range from which on a wrong unit or scale is likelier than another tap: mm/min
 and mm/s are 60 apart."""
+
+OTHER_NAME: Final = (62, 64)
+"""OpenSSL's codes of a certificate that is another host's (X509_V_ERR_HOSTNAME_MISMATCH) or address's."""
 
 
 def probe(cell: Path) -> None:
@@ -86,6 +91,8 @@ def _hint(config: CellConfig, error: FieldbusError) -> str:
             "; a module that takes one client may have closed it for another, the service for one: end that, "
             "then probe"
         )
+    if isinstance(error, LinkError) and (place := _tls_place(config, error.__cause__)):
+        return f"; see {place}"
     if isinstance(error, LinkError):
         return f"; see {config.place('module.host', 'module.port')}"
     if isinstance(error, ProtocolError) and "of the status block" in str(error):
@@ -96,6 +103,22 @@ def _hint(config: CellConfig, error: FieldbusError) -> str:
             f"them with its manual; see {register_map}:{positions.key(('registers', 'status_crc32'))}"
         )
     return f"; see {_line_of(config, str(error))}" if isinstance(error, WrongDeviceError) else ""
+
+
+def _tls_place(config: CellConfig, cause: BaseException | None) -> str:
+    """Say which of the link's certificates it fails by, and where that is named; empty where by none."""
+    tls = config.settings.module.tls
+    if tls is None:
+        return ""
+    fault = next((remark for remark in of_module_tls(tls) if remark.is_fault), None)
+    if fault is not None:
+        return f"{config.place('.'.join(fault.place))}: {fault.message}"
+    while not isinstance(cause, ssl.SSLCertVerificationError):
+        if cause is None:
+            return ""
+        cause = cause.__cause__
+    is_name = cause.verify_code in OTHER_NAME
+    return config.place("module.tls.server_name" if is_name else "module.tls.ca_certificate")
 
 
 def _line_of(config: CellConfig, fault: str) -> str:

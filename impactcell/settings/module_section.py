@@ -78,8 +78,16 @@ class ModuleSection(Section):
 
     @model_validator(mode="after")
     def _transport_has_what_it_needs(self) -> Self:
-        if (self.transport == "rtu") != (self.serial is not None):
-            raise ValueError("`serial` belongs to `transport: rtu`, and to no other")
+        if self.transport == "rtu" and self.serial is None:
+            raise ValueError(
+                "`transport: rtu` needs `serial` in the place of `host` and `port`, as in "
+                "`serial: {device: /dev/ttyUSB0}`"
+            )
+        if self.transport != "rtu" and self.serial is not None:
+            raise ValueError(
+                f"`serial` belongs to `transport: rtu`, this is `transport: {self.transport}`: say "
+                "`transport: rtu`, or leave `serial` out"
+            )
         if self.transport == "tls" and self.tls is None:
             raise ValueError("`transport: tls` needs `tls` with its certificates")
         if self.tls is not None and self.transport not in ("tcp", "tls"):

@@ -6,6 +6,9 @@ import shlex
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Final
+
+from cryptography import x509
 
 from impactcell.errors import AccessError
 from impactcell.journal.refusal import refusal
@@ -19,11 +22,23 @@ from impactcell.opcua.own_certificate import (
     read_own_key,
 )
 from impactcell.process.path_kind import Kind, kind_at
-from impactcell.process.tls_pair import pair_fault
+from impactcell.process.tls_pair import authority_fault, pair_fault
 from impactcell.scada.interface import default_application_uri
 from impactcell.scada.users import read_users
 from impactcell.settings.cells import CellConfig
+from impactcell.settings.module_section import TlsSection
 from impactcell.settings.remark import Remark
+
+_TLS: Final = ("module", "tls")
+"""Where the cell file names the certificates of the link to the module."""
+_ANOTHER_FOR_THE_MODULE: Final = (
+    "a module that looks at it refuses the connection; put another in its place, which the service uses "
+    "from its next connection on"
+)
+_ANOTHER_AUTHORITY: Final = (
+    "a module is refused whose authority's certificate does not hold; put the new one in its place, which "
+    "the service uses from its next connection on"
+)
 
 
 def of_service(cell: CellConfig) -> Iterator[Remark]:
@@ -32,7 +47,9 @@ def of_service(cell: CellConfig) -> Iterator[Remark]:
     yield from _of_users(settings.opcua.users_file)
     yield from _of_certificates(settings.opcua.certificates_dir)
     if settings.web is not None and settings.web.certificate is not None and settings.web.key is not None:
-        yield from _of_page(settings.web.certificate, settings.web.key)
+        yield from _of_pair(("web",), settings.web.certificate, settings.web.key, ANOTHER_FOR_THE_PAGE)
+    if settings.module.tls is not None:
+        yield from of_module_tls(settings.module.tls)
     if settings.journal is not None:
         yield from _of_journal(settings.journal.file, cell.name)
     else:
@@ -84,20 +101,37 @@ def _of_certificates(directory: Path) -> Iterator[Remark]:
         yield Remark(place, f"opcua.certificates_dir: {error}")
 
 
-def _of_page(certificate: Path, key: Path) -> Iterator[Remark]:
-    """Say why the page could not start with its certificate, and where that does not hold."""
-    unread = {name: file for name, file in (("certificate", certificate), ("key", key)) if _is_barred(file)}
-    for name, file in unread.items():
-        yield Remark(("web", name), f"{file} is not yours to read: not looked at", is_fault=False)
+def of_module_tls(tls: TlsSection) -> Iterator[Remark]:
+    """Say which certificates an encrypted link to the module could not use, and which do not hold."""
+    name, authorities = "ca_certificate", tls.ca_certificate
+    place = (*_TLS, name)
+    if _is_barred(authorities):
+        yield Remark(place, f"{authorities} is not yours to read: not looked at", is_fault=False)
+    elif fault := authority_fault(authorities):
+        yield Remark(place, f"module.tls.{name}: {fault}")
+    else:
+        with contextlib.suppress(ValueError):  # TLS may be able to use what cannot be read here
+            found = x509.load_pem_x509_certificates(authorities.read_bytes())
+            latest = max(found, key=lambda certificate: certificate.not_valid_after_utc)
+            if doubt := validity_doubt(latest, datetime.now(UTC)):
+                yield Remark(place, f"{authorities}: {doubt}: {_ANOTHER_AUTHORITY}", is_fault=False)
+    if tls.certificate is not None:
+        yield from _of_pair(_TLS, tls.certificate, tls.key or tls.certificate, _ANOTHER_FOR_THE_MODULE)
+
+
+def _of_pair(section: tuple[str, ...], certificate: Path, key: Path, another: str) -> Iterator[Remark]:
+    """Say why TLS could not use a certificate with its key, and where that does not hold."""
+    unread = {file: name for name, file in (("key", key), ("certificate", certificate)) if _is_barred(file)}
+    for file, name in unread.items():
+        yield Remark((*section, name), f"{file} is not yours to read: not looked at", is_fault=False)
     if not unread and (fault := pair_fault(certificate, key)):
-        name = "key" if fault.startswith(f"{key}:") else "certificate"
-        yield Remark(("web", name), f"web.{name}: {fault}")
-    elif certificate not in unread.values():
+        place = (*section, "certificate" if fault.startswith(f"{certificate}:") else "key")
+        yield Remark(place, f"{'.'.join(place)}: {fault}")
+    elif certificate not in unread:
         with contextlib.suppress(AccessError):  # TLS may be able to use what cannot be read here
             doubt = validity_doubt(read_certificate(certificate), datetime.now(UTC))
             if doubt:
-                message = f"{certificate}: {doubt}: {ANOTHER_FOR_THE_PAGE}"
-                yield Remark(("web", "certificate"), message, is_fault=False)
+                yield Remark((*section, "certificate"), f"{certificate}: {doubt}: {another}", is_fault=False)
 
 
 def _of_journal(file: Path, cell: str) -> Iterator[Remark]:

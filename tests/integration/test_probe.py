@@ -2,11 +2,13 @@
 
 import asyncio
 import re
+import ssl
 from pathlib import Path
 
 import pytest
 import yaml
 
+from tests.certificates import Authority
 from tests.integration.forked import forked
 from tests.integration.processes import CONFIG, simulator, write_cell
 
@@ -192,3 +194,33 @@ async def test_a_module_that_is_not_there_is_named(tmp_path: Path) -> None:
         r"impactcell: press-1: \S+ device 1: .* nothing listens at this host and port; see \S+press-1",
         err,
     )
+
+
+@pytest.mark.parametrize("transport", ["tcp", "tls"])
+@pytest.mark.parametrize("wrong", ["server_name", "ca_certificate", "nonsense"])
+async def test_a_certificate_that_the_link_fails_by_is_named(
+    tmp_path: Path, transport: str, wrong: str
+) -> None:
+    authority, other = Authority(tmp_path, "plant"), Authority(tmp_path, "other")
+    tls = {"ca_certificate": str(authority.file), "server_name": "module.test"}
+    key = "ca_certificate" if wrong == "nonsense" else wrong
+    tls[key] = "pump.test" if wrong == "server_name" else str(other.file)
+    if wrong == "nonsense":
+        await asyncio.to_thread(other.file.write_bytes, b"")
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(*authority.issue("module"))
+    server = await asyncio.start_server(_silent, "127.0.0.1", 0, ssl=context)
+    port = server.sockets[0].getsockname()[1]
+    module = {"transport": transport, "window": 1, "timeout_ms": 30_000, "tls": tls}
+    code, out, err = await probed(write_cell(tmp_path, port, module=module))
+    server.close()
+    assert (code, out) == (1, "")
+    place = re.search(r"; see (\S+):(\d+):\d+", err)
+    assert place is not None, err
+    lines = await asyncio.to_thread(Path(place[1]).read_text)
+    assert lines.splitlines()[int(place[2]) - 1].strip() == f"{key}: {tls[key]}"
+
+
+async def _silent(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    await reader.read(-1)
+    writer.close()

@@ -76,8 +76,14 @@ def test_the_registers_of_the_page_are_registers() -> None:
 @pytest.mark.parametrize(
     ("module", "told"),
     [
-        ({"transport": "rtu"}, "`serial` belongs to `transport: rtu`"),
-        ({"serial": {"device": "/dev/ttyS0"}}, "`serial` belongs to `transport: rtu`"),
+        (
+            {"transport": "rtu"},
+            r"`transport: rtu` needs `serial` in the place of `host` and `port`, as in `serial: \{device: ",
+        ),
+        (
+            {"serial": {"device": "/dev/ttyS0"}},
+            "`serial` belongs to `transport: rtu`, this is `transport: tcp`: say `transport: rtu`, or leave",
+        ),
         ({"transport": "tls"}, "needs `tls` with its certificates"),
         ({"transport": "udp", "tls": {"ca_certificate": str(SHIPPED)}}, "does not go with"),
         ({"transport": "ascii"}, "transport"),
