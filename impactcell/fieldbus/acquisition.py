@@ -8,9 +8,9 @@ the module or the link does: that is said in its `status` and in the `faults` of
 import asyncio
 import contextlib
 import logging
+from collections import deque
 from collections.abc import AsyncGenerator, Callable
 from dataclasses import replace
-from types import TracebackType
 from typing import Self
 
 from impactcell.errors import FieldbusError, LinkError
@@ -79,6 +79,7 @@ class ModuleAcquisition:
         self._taken = TakenCycles(None, 0, registers.slots, self._numbers)
         self._dates = CycleDates(registers, self._log)
         self._status = ModuleStatus()
+        self._logged = deque[str](maxlen=16)  # kinds of reasons since there was a connection
         self._on_change = on_change
         self._ready = asyncio.Event()
         self._acknowledgement = Acknowledgement(self._log, self.register_client, self._numbers)
@@ -105,9 +106,7 @@ class ModuleAcquisition:
         """Return the module."""
         return self
 
-    async def __aexit__(
-        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    async def __aexit__(self, *_: object) -> None:
         """Close the connection."""
         await self.close()
 
@@ -256,20 +255,22 @@ class ModuleAcquisition:
         return status
 
     async def _disconnect(self, error: FieldbusError) -> None:
-        """Close the connection after an error and say why, once for each new kind of reason."""
+        """Close the connection after an error and say why; the log, once for each kind of reason."""
         self._ready.clear()
         await self._client.close()
         reason = str(error) if str(error).startswith(self.cell) else f"{self.cell}: {error}"
         self._report_link(connected=False, reason=reason)
 
     def _report_link(self, *, connected: bool, reason: str, level: int = logging.WARNING) -> None:
-        before = self._status
-        if (before.connected, kind_of(before.reason)) == (connected, kind_of(reason)):
+        before, kind = self._status, kind_of(reason)
+        if (before.connected, kind_of(before.reason)) == (connected, kind):
             return
         self._status = replace(before, connected=connected, reason=reason)
         if connected:
+            self._logged.clear()
             self._log.info("connected to %s", self.link)
-        else:
+        elif kind not in self._logged:
+            self._logged.append(kind)
             self._log.log(level, "%s", reason.removeprefix(f"{self.cell}: "))
         if self._on_change is not None:
             self._on_change(self.status)

@@ -138,6 +138,11 @@ class ModuleLink:
         """What leads to the same endpoint shares one connection: host and port, or the serial port and 0."""
         return (self.host, self.port) if self.serial is None else (self.serial.device, 0)
 
+    @property
+    def patience(self) -> str:
+        """How long is waited, and the key that says so, for messages."""
+        return f"{1e3 * self.timeout_s:g} ms (timeout_ms)"
+
     def __str__(self) -> str:
         """Where and which device, for messages."""
         if self.serial is not None:

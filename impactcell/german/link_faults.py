@@ -42,6 +42,7 @@ EXCEPTIONS: Final = {
 ANY: Final = "|".join(REQUESTS)
 """Any request, as a pattern; its groups do not count."""
 _REQUEST: Final = "(?P<request>" + re.sub(r"\((?!\?)", "(?:", ANY) + ")"
+_TIME: Final = r"\S+ (?:s|ms \(timeout_ms\))"
 _REFUSED: Final = _REQUEST + r" refused: (?P<exception>.+) \(exception (?P<code>\d+)\)"
 _REFUSED_GERMAN: Final = r"\g<request> wird abgelehnt: \g<exception> (Ausnahme \g<code>)"
 _IF_GAPS: Final = (
@@ -52,7 +53,7 @@ _IF_GAPS_GERMAN: Final = (
     "`gaps: false` angeben"
 )
 GERMAN: Final = {
-    r"no connection within (\S+) s": r"keine Verbindung innerhalb von \1 s",
+    rf"no connection within ({_TIME})": r"keine Verbindung innerhalb von \1",
     r"no connection: nothing listens at this host and port":
         "keine Verbindung: unter dieser Adresse und diesem Port antwortet kein Programm",
     r"no connection: a host's name has 1 to 63 characters between its dots":
@@ -64,8 +65,8 @@ GERMAN: Final = {
     r"not connected": "nicht verbunden",
     r"the connection was lost while several requests were in flight":
         "die Verbindung ging verloren, während mehrere Anfragen unterwegs waren",
-    rf"no answer to {_REQUEST} within (?P<s>\S+) s(?:, of \d+ in flight \(window \d+\))?":
-        r"keine Antwort auf \g<request> innerhalb von \g<s> s",
+    rf"no answer to {_REQUEST} within (?P<time>{_TIME})(?:, of \d+ in flight \(window \d+\))?":
+        r"keine Antwort auf \g<request> innerhalb von \g<time>",
     _REFUSED: _REFUSED_GERMAN,
     _REFUSED + _IF_GAPS: _REFUSED_GERMAN + _IF_GAPS_GERMAN,
     _REFUSED + _IF_GAPS + r"; this is not a module of map \S+, or device_id (?P<device>\d+) is wrong":
@@ -121,8 +122,8 @@ SHOWN: Final = {
 def german_link_fault(reason: str) -> str:
     """Say in German why a module does not answer; cell, address and device before it stay as they are.
 
-    >>> german_link_fault("press-1: 10.0.0.9:502 device 1: no connection within 0.5 s")
-    'press-1: 10.0.0.9:502 Gerät 1: keine Verbindung innerhalb von 0,5 s'
+    >>> german_link_fault("press-1: 10.0.0.9:502 device 1: no connection within 2.5 ms (timeout_ms)")
+    'press-1: 10.0.0.9:502 Gerät 1: keine Verbindung innerhalb von 2,5 ms (timeout_ms)'
     >>> german_link_fault("p: 2 holding registers from 100 refused: illegal data address (exception 2)")
     'p: die Anfrage nach 2 Registern ab 100 wird abgelehnt: diese Adresse gibt es dort nicht (Ausnahme 2)'
     """
@@ -131,7 +132,7 @@ def german_link_fault(reason: str) -> str:
         return reason
     names, german = found
     before = [re.sub(r" device (\d+)$", r" Gerät \1", name) for name in names]
-    return ": ".join([*before, re.sub(r"(?<=\d)\.(?=\d+ s)", ",", german)])
+    return ": ".join([*before, re.sub(r"(?<=\d)\.(?=\d+ m?s\b)", ",", german)])
 
 
 _WORDS: Final[Mapping[str, Callable[[str], str]]] = {

@@ -17,6 +17,8 @@ class PlausibleRange:
         Our choice: some two orders of magnitude to either side of the paper's prototype.
     others : mapping
         Other units by what one of them is in `unit`.
+    of : str
+        What has such a quantity, in the plural.
     """
 
     name: str
@@ -24,6 +26,7 @@ class PlausibleRange:
     low: float
     high: float
     others: Mapping[str, float]
+    of: str = "taps"
 
     def doubt(self, value: float) -> str:
         """Say that a value is hardly meant, and the unit in which it would be; empty where it may be."""
@@ -36,7 +39,7 @@ class PlausibleRange:
                 way_out = f"if that was meant in {other}, write {factor * value:g}"
                 break
         return (
-            f"{self.name} of {value:g}{unit} is hardly meant, where taps have {self.low:g} to "
+            f"{self.name} of {value:g}{unit} is hardly meant, where {self.of} have {self.low:g} to "
             f"{self.high:g}{unit}: {way_out}"
         )
 

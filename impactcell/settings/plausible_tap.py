@@ -15,6 +15,8 @@ VELOCITY: Final = PlausibleRange(
 STIFFNESS: Final = PlausibleRange("a stiffness", "N/m", 1e4, 1e9, {"N/mm": 1e3, "N/µm": 1e6})
 DAMPING: Final = PlausibleRange("a damping", "N s/m", 1.0, 1e5, {"N s/mm": 1e3, "N s/µm": 1e6})
 FRICTION: Final = PlausibleRange("a friction coefficient", "", 0.01, 1.5, {"%": 0.01})
+TRAVEL: Final = PlausibleRange("a travel", "mm", 0.1, 1e3, {"m": 1e3, "µm": 1e-3}, "parts")
+TIMEOUT: Final = PlausibleRange("a timeout", "ms", 5.0, 6e4, {"s": 1e3, "µs": 1e-3}, "links")
 """Ranges beyond which a value was hardly meant, with the units that it may have been said in. Our choice."""
 IN_THE_MAP: Final = ("module", "register_map")
 """Where the cell file names what stands in the register map."""
@@ -25,13 +27,15 @@ IN_THE_MODEL: Final = ("model",)
 def doubted_values(cell: CellConfig) -> Iterator[tuple[tuple[str, ...], str]]:
     """Yield the place in the cell file and the doubt for each value that is hardly meant."""
     settings, plant, constants = cell.settings, cell.model.plant, cell.register_map.constants
-    actuator = settings.actuator
+    actuator, positioning = settings.actuator, settings.positioning
     said: tuple[tuple[tuple[str, ...], PlausibleRange, float | None], ...] = (
         (("part", "mass_kg"), MASS, settings.part.mass_kg),
         (("actuator", "stroke_mm"), STROKE, actuator.stroke_mm),
         (("actuator", "max_stroke_mm"), STROKE, actuator.max_stroke_mm),
         (("actuator", "max_velocity_mm_per_min"), VELOCITY, actuator.max_velocity_mm_per_min),
         (("alarms", "wear_limit"), FRICTION, settings.alarms.wear_limit),
+        (("positioning", "travel_mm"), TRAVEL, positioning.travel_mm if positioning else None),
+        (("module", "timeout_ms"), TIMEOUT, settings.module.timeout_ms),
         (IN_THE_MAP, MASS, constants.get("mass")),
         (IN_THE_MAP, STROKE, 1e3 * constants["stroke"] if "stroke" in constants else None),
         (IN_THE_MODEL, STIFFNESS, plant.stiffness_n_per_m),

@@ -27,3 +27,13 @@ class PositioningSection(Section):
                 f"{self.encoder_resolution_um:g}: raise it"
             )
         return self
+
+    @model_validator(mode="after")
+    def _wider_than_its_tolerance(self) -> Self:
+        travel_um = self.travel_mm * 1e3
+        if travel_um < 2.0 * self.tolerance_um:
+            raise ValueError(
+                f"travel_mm {self.travel_mm:g} is {travel_um:g} µm, no more than the tolerance to both sides "
+                f"of a target (tolerance_um {self.tolerance_um:g}): check the units of both"
+            )
+        return self

@@ -100,7 +100,8 @@ async def test_a_module_that_stays_silent_has_its_device_id_named(tmp_path: Path
     server.close()
     assert (code, out) == (1, "")
     assert re.match(
-        rf"impactcell: press-1: 127\.0\.0\.1:{port}.* device 7: no answer to .* within 0\.5 s; ", err
+        rf"impactcell: press-1: 127\.0\.0\.1:{port}.* device 7: no answer to .* within 500 ms \(timeout_ms\)",
+        err,
     )
     assert re.search(r"device_id 7 may be wrong, .* \(see \S+press-1\.yaml:\d+:14\); or another client", err)
 

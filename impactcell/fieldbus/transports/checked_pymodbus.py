@@ -159,7 +159,7 @@ class CheckedPymodbus:
             async with asyncio.timeout(timeout_s):
                 await client.execute(False, _RawRequest(request.pdu, device_id))  # noqa: FBT003 - pymodbus's
         except TimeoutError:
-            raise NoAnswerError(f"no answer to {request.description} within {link.timeout_s:g} s") from None
+            raise NoAnswerError(f"no answer to {request.description} within {link.patience}") from None
         except ModbusException as error:
             raise ProtocolError(f"{request.description}: {error}") from error
         finally:
@@ -231,7 +231,7 @@ class CheckedPymodbus:
     def _unreachable(self) -> str:
         match self._why:
             case None:
-                return f"no connection within {self._link.timeout_s:g} s"
+                return f"no connection within {self._link.patience}"
             case ConnectionRefusedError():
                 return "no connection: nothing listens at this host and port"
             case error:

@@ -61,7 +61,7 @@ class PipelinedTcp:
                     server_hostname=name,
                 )
         except TimeoutError:
-            raise LinkError(f"{link}: no connection within {link.timeout_s:g} s") from None
+            raise LinkError(f"{link}: no connection within {link.patience}") from None
         except ConnectionRefusedError as error:
             raise LinkError(f"{link}: no connection: nothing listens at this host and port") from error
         except OSError as error:

@@ -196,7 +196,7 @@ class TcpConnection(asyncio.BufferedProtocol):
         if left_s > 0.0:
             self._timeout_timer = self._loop.call_later(left_s, self._check_timeout)
             return
-        timeout = f"within {self.link.timeout_s:g} s"
+        timeout = f"within {self.link.patience}"
         if self._requests_in_flight > 1:
             timeout += f", of {self._requests_in_flight} in flight (window {self.window.size})"
         self.fail(

@@ -452,6 +452,24 @@ async def test_the_wrong_module_is_named_and_the_right_one_taken_when_it_comes(
     assert [s.connected for s in statuses[1:]] == [False, True, False]
 
 
+async def test_reasons_that_take_turns_are_logged_once_each(
+    fpga: RegisterMap, caplog: pytest.LogCaptureFixture
+) -> None:
+    device = ScriptedDevice(fpga)
+    make(device)
+    async with running(fpga, device) as (_, module, receptions):
+        waiting = asyncio.ensure_future(anext(receptions))  # type: ignore[arg-type]
+        for _ in range(3):
+            for shown in ("PUMP-A", "PUMP-B"):
+                device.put("module_name", shown)
+                while f"shows '{shown}'" not in module.status.reason:
+                    await asyncio.sleep(0)
+        device.put("module_name", fpga["module_name"].expect)
+        assert_whole(await waiting)
+        for shown in ("PUMP-A", "PUMP-B"):
+            assert sum(f"shows '{shown}'" in line for line in caplog.messages) == 1
+
+
 async def test_a_wrong_device_id_is_named(fpga: RegisterMap) -> None:
     device = ScriptedDevice(fpga)
     async with running(fpga, device, device_id=7) as (_, module, receptions):

@@ -234,5 +234,5 @@ async def test_a_window_of_requests_that_are_answered_one_after_the_other_is_wai
 
 async def test_a_timeout_says_how_many_requests_were_in_flight() -> None:
     async with gateway(60.0, 0.05) as client:
-        with pytest.raises(LinkError, match=r"within 0.05 s, of 16 in flight \(window 16\)"):
+        with pytest.raises(LinkError, match=r"within 50 ms \(timeout_ms\), of 16 in flight \(window 16\)"):
             await client.read(0, 160)

@@ -26,7 +26,7 @@ from impactcell.web.live_feed import LiveFeed
 from tests.integration.processes import CONFIG
 from tests.patience import PATIENCE_S
 
-SILENT = "press-1: 10.0.0.9:502 device 1: no connection within 0.5 s"
+SILENT = "press-1: 10.0.0.9:502 device 1: no connection within 500 ms (timeout_ms)"
 NO_ROUTE = "press-1: 10.0.0.9:502 device 1: no connection: No route to host"
 STRANGER = "press-1: 10.0.0.9:502 device 1: register magic (0) shows 7, map prototype expects 18753"
 ANOTHER = STRANGER.replace("shows 7", "shows 8")
@@ -130,7 +130,7 @@ async def test_a_lost_link_tells_why_it_is_lost_now(
     name = module_connection.NAME
     async with beside(task._tell_link()), beside(task._tick()):
         task._module._report_link(connected=False, reason=SILENT)
-        await says(task, name, "no connection within 0.5 s")
+        await says(task, name, "no connection within 500 ms (timeout_ms)")
         await acknowledge(task, name)
         task._module._report_link(connected=False, reason=STRANGER)
         now = await says(task, name, "map prototype expects 18753")
@@ -167,7 +167,7 @@ async def test_a_start_of_the_service_is_no_fault_of_the_link(
                 await asyncio.sleep(0)
         assert not alarm(task, name).active
         task._module._report_link(connected=False, reason=SILENT)
-        assert (await says(task, name, "no connection within 0.5 s")).active
+        assert (await says(task, name, "no connection within 500 ms (timeout_ms)")).active
     assert [a.active for a in await transitions(task, tmp_path, name)] == [True]
 
 

@@ -37,6 +37,22 @@ def judged(directory: Path, of_cell: dict[str, str], of_model: dict[str, str]) -
         ({"mass_kg": "0.0045"}, {}, "a mass of 0.0045 kg is hardly meant.* meant in t, write 4.5"),
         ({"stroke_mm": "0.0015"}, {}, "a stroke of 0.0015 mm is hardly meant.* meant in m, write 1.5"),
         ({"stroke_mm": "1500"}, {}, "a stroke of 1500 mm is hardly meant.* meant in µm, write 1.5"),
+        (
+            {"device_id": "1\n  timeout_ms: 0.5"},
+            {},
+            "a timeout of 0.5 ms is .* links have .* in s, write 500",
+        ),
+        ({"device_id": "1\n  timeout_ms: 5e+5"}, {}, "a timeout of 500000 ms is .* meant in µs, write 500"),
+        (
+            {"wear_limit": "0.25\npositioning: {travel_mm: 40000}"},
+            {},
+            "a travel of 40000 mm is .* parts have .* meant in µm, write 40",
+        ),
+        (
+            {"wear_limit": "0.25\npositioning: {travel_mm: 0.09, tolerance_um: 1}"},
+            {},
+            "a travel of 0.09 mm is .* meant in m, write 90",
+        ),
         ({"wear_limit": "25"}, {}, "coefficient of 25 is hardly meant.* meant in %, write 0.25"),
         ({}, {"stiffness_n_per_m": "650"}, "'prototype': a stiffness of 650 N/m .* N/mm, write 650000"),
         ({}, {"damping_n_s_per_m": "0.465"}, "'prototype': a damping of 0.465 .* N s/mm, write 465"),

@@ -113,6 +113,11 @@ def test_a_name_or_an_address_is_a_host(config: Path, host: str) -> None:
             "format: 1\npositioning: {tolerance_um: 0.5}",
             "tolerance_um 0.5 is finer than encoder_resolution_um 1: raise it",
         ),
+        (
+            "format: 1",
+            "format: 1\npositioning: {tolerance_um: 50, travel_mm: 0.04}",
+            r"travel_mm 0.04 is 40 µm, no more than .* \(tolerance_um 50\): check the units of both",
+        ),
         ("format: 1", "format: 2", "format"),
         ("cell: prototype", "cell: 7", "valid string"),
         ("../models/prototype.yaml", "none.yaml", "no file"),

@@ -72,7 +72,9 @@ async def test_what_a_transport_says_has_its_german() -> None:
     said.append(await why(port))
     german = [german_link_fault(f"press-1: {reason}") for reason in said]
     assert not [text for text in german if ENGLISH.search(text)], said
-    unanswered = "Gerät 1: keine Antwort auf die Anfrage nach 2 Registern ab 100 innerhalb von 0,2 s"
+    unanswered = (
+        "Gerät 1: keine Antwort auf die Anfrage nach 2 Registern ab 100 innerhalb von 200 ms (timeout_ms)"
+    )
     assert german[0].endswith(unanswered)
     assert german[0].startswith("press-1: 127.0.0.1:")
 
@@ -200,7 +202,8 @@ def test_every_fault_of_a_link_in_the_program_has_its_german() -> None:
         words = words.replace("{self._request.description}", READ.description)
         words = words.replace("{request.description}", READ.description)
         words = words.replace("{error};", f"{READ.description} refused: illegal function (exception 1);")
-        words = re.sub(r"\{oldest\.batch.*?\} \{timeout\}", f"{READ.description} within 1 s", words)
+        words = re.sub(r"\{oldest\.batch.*?\} \{timeout\}", f"{READ.description} within {{patience}}", words)
+        words = re.sub(r"\{[\w.]*patience\}", "9 ms (timeout_ms)", words)
         words = re.sub(r"\{[^{}]*(?:link|_cell)[^{}]*\}: ", "", words)
         words = re.sub(r"\{(?:\{\}|[^{}])*(?:\{[^{}]*\}[^{}]*)*\}", "7", words)
         assert german_link_fault(words) != words or words in ("7", "7: 7"), words
@@ -211,9 +214,12 @@ def test_what_is_not_known_stays_as_it_is() -> None:
 
 
 def test_the_alarm_and_the_card_say_it() -> None:
-    reason = "press-1: 10.0.0.9:502 device 1: no connection within 0.5 s"
+    reason = "press-1: 10.0.0.9:502 device 1: no connection within 2.5 ms (timeout_ms)"
     result = module_connection.result(reason, connected=False)
-    assert "Gerät 1: keine Verbindung innerhalb von 0,5 s. Stromversorgung" in result.message.german
+    assert (
+        "Gerät 1: keine Verbindung innerhalb von 2,5 ms (timeout_ms). Stromversorgung"
+        in result.message.german
+    )
     view = CellView("press-1")
     view.take(CellNews("press-1", status=ModuleStatus(connected=False, reason=reason)))
     said = json.loads(view.encode("card"))["link_reason"]
