@@ -26,7 +26,8 @@ nitpicky = False
 
 html_theme = "furo"
 html_title = f"impactcell {release}"
-html_static_path: list[str] = []
+html_static_path = ["_static"]
+html_css_files = ["tables.css"]
 html_show_sphinx = False
 html_copy_source = False
 

@@ -44,14 +44,12 @@ def variables() -> str:
             continue
         folder = objects.get(node.attrib.get("ParentNodeId", ""))
         arguments = below.get((node.attrib["NodeId"], "InputArguments"))
-        typed = _arguments(arguments) if kind == "UAMethod" else _data_type(node)
+        typed = f"method: {_arguments(arguments)}" if kind == "UAMethod" else _data_type(node)
         path = f"{folder}/{name}" if folder else name
-        history = "yes" if node.attrib.get("Historizing") == "true" else ""
         unit = _unit(below.get((node.attrib["NodeId"], "EngineeringUnits")))
-        rows.append((code(path), kind.removeprefix("UA").lower(), typed, unit, history, description))
-    return table(
-        ("path below the cell", "kind", "type, or arguments", "unit", "history", "description"), rows
-    )
+        history = "history" if node.attrib.get("Historizing") == "true" else ""
+        rows.append((code(path), description, ", ".join(filter(None, (typed, unit, history)))))
+    return table(("path below the cell", "description", "type and unit, or arguments"), rows)
 
 
 def _name(node: ET.Element) -> str:
@@ -67,7 +65,8 @@ def _unit(node: ET.Element | None) -> str:
     """Say the unit as people write it; 1 of a pure number."""
     if node is None:
         return ""
-    return node.findtext(f".//{TYPES}EUInformation/{TYPES}DisplayName/{TYPES}Text") or "1"
+    told = node.findtext(f".//{TYPES}EUInformation/{TYPES}DisplayName/{TYPES}Text")
+    return f"unit {told or 1}"
 
 
 def _arguments(node: ET.Element | None) -> str:

@@ -31,10 +31,8 @@ def keys() -> str:
         (
             code(name),
             str(register["address"]),
-            _type(register),
-            register.get("unit", ""),
-            "yes" if register.get("writable") else "",
             register.get("description", ""),
+            _type(register),
             _further(register),
         )
         for name, register in shipped.items()
@@ -55,16 +53,17 @@ def keys() -> str:
             "As `impactcell check`, `impactcell probe` and the log say it of the maps of poorer modules:",
             table(("map", "not promised"), _promises()),
             "## The layout `fpga-v1`",
-            table(("register", "address", "type", "unit", "writable", "meaning", "further keys"), rows),
+            table(("register", "address", "meaning", "type and unit", "further keys"), rows),
         ]
     )
 
 
 def _type(register: dict[str, Any]) -> str:
-    """Say the type, and how many values or registers there are of it."""
-    if "length" in register:
-        return f"{register['type']}, {register['length']} registers"
-    return register["type"] + (f" × {register['count']}" if register.get("count", 1) > 1 else "")
+    """Say the type, how many values or registers there are of it, its unit, and whether it is written."""
+    told = register["type"] + (f" × {register['count']}" if register.get("count", 1) > 1 else "")
+    told += f", {register['length']} registers" if "length" in register else ""
+    told += f", {register['unit']}" if "unit" in register else ""
+    return told + (", writable" if register.get("writable") else "")
 
 
 def _further(register: dict[str, Any]) -> str:

@@ -108,23 +108,23 @@ def test_every_key_of_a_cell_file_is_listed(pages: dict[str, str]) -> None:
 def test_nodes_and_conditions_are_listed(pages: dict[str, str]) -> None:
     for path in ("Friction/StaticFriction", "Wear/CyclesToLimitHigh", "Signature/TSquared", "StartBatch"):
         assert f"| `{path}` |" in pages["nodes.md"]
-    marked = re.findall(
-        r"^\| `([^`]+)` \| variable \| \w+ \| [^|]* \| yes \|", pages["nodes.md"], flags=re.MULTILINE
-    )
+    marked = re.findall(r"^\| `([^`]+)` \| [^|]+ \| [^|]+, history \|", pages["nodes.md"], flags=re.MULTILINE)
     assert sorted(marked) == sorted(HISTORY)
     assert "`Expected` (Boolean)" in pages["nodes.md"], "arguments of methods, with their types"
-    assert "| `Signature/Position` | variable | Double[] | mm |" in pages["nodes.md"]
-    assert "| `<condition>/Statistic` | variable | Double |" in pages["nodes.md"]
+    for path, typed in (("Signature/Position", r"Double\[\], unit mm"), ("<condition>/Statistic", "Double")):
+        assert re.search(rf"^\| `{path}` \| [^|]+ \| {typed} \|", pages["nodes.md"], re.MULTILINE)
     for quantity in (*CYCLE, *MODULE):
-        unit = "" if quantity.unit is None else quantity.unit.symbol or "1"
+        unit = "" if quantity.unit is None else f", unit {quantity.unit.symbol or 1}"
         assert re.search(
-            rf"^\| `{quantity.path}` \| variable \| [^|]+ \| {unit} \|", pages["nodes.md"], re.MULTILINE
-        )
+            rf"^\| `{quantity.path}` \| [^|]+ \| [\w\[\]]+{unit}(, history)? \|",
+            pages["nodes.md"],
+            re.MULTILINE,
+        ), quantity.path
     for name, rule in RULES.items():
         assert f"| `{name}` | {rule.settings.severity} |" in pages["alarms.md"]
         row = next(row for row in pages["alarms.md"].splitlines() if row.startswith(f"| `{name}` |"))
         assert row.endswith("| yes |") == (rule.evaluate is not None), "whose delays the cell file sets"
-    assert "| `cycle_counter` | 36 | u32 |" in pages["register_map.md"]
+    assert re.search(r"^\| `cycle_counter` \| 36 \| [^|]+ \| u32 \|", pages["register_map.md"], re.MULTILINE)
 
 
 def test_a_register_is_listed_with_all_that_its_map_says(pages: dict[str, str]) -> None:
