@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 from asyncua import ua
 
-from impactcell.errors import AccessError
+from impactcell.errors import SettingsError
 from impactcell.opcua.asyncua_adapter import AddressSpace, SecurityPolicyFactory, bound_null_arrays
 from impactcell.opcua.attribute_service import AttributeService
 from impactcell.opcua.authentication import Authenticator
@@ -82,7 +82,7 @@ class ServiceHost:
 
         Raises
         ------
-        AccessError
+        SettingsError
             The address cannot be listened on.
         """
         settings, host = self._settings, self._host
@@ -136,9 +136,9 @@ class ServiceHost:
         except (OSError, ValueError) as error:
             number = getattr(error, "errno", None)
             reason = os.strerror(number) if number is not None and number > 0 else str(error)
-            raise AccessError(
+            raise SettingsError(
                 f"OPC UA server: cannot listen on {settings.endpoint} ({reason}); choose another "
-                "`endpoint` under `opcua`, or end what uses it"
+                "`opcua.endpoint`, or end what uses it"
             ) from error
         self._discovery.port = self._listener.sockets[0].getsockname()[1]
         loop = asyncio.get_running_loop()

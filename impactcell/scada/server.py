@@ -80,9 +80,9 @@ class Server:
     Raises
     ------
     AccessError
-        On entering: certificate, key, users file or address are unusable.
+        On entering: certificate, key or users file are unusable.
     SettingsError
-        On entering: a name of a cell cannot be part of a NodeId, or is there twice.
+        On entering: the address cannot be listened on; a cell's name cannot be part of a NodeId, or is twice.
     """
 
     def __init__(

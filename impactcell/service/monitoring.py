@@ -231,7 +231,8 @@ class Monitoring:
         except OSError as error:
             host = f"[{self.host}]" if ":" in self.host else self.host
             raise SettingsError(
-                f"monitoring: cannot listen on {host}:{self.port} ({error.strerror}); choose another"
+                f"monitoring: cannot listen on {host}:{self.port} ({error.strerror}); choose another "
+                "`monitoring.host` or `monitoring.port`, or end what uses it"
             ) from error
         self.port = self._server.server_address[1]
         self._is_ending = False

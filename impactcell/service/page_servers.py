@@ -57,7 +57,8 @@ async def served_pages(
                 await asyncio.to_thread(page.start)
             except SettingsError as error:
                 if "web" in on_page[0].settings.model_fields_set:
-                    raise
+                    key = "web.endpoint" if isinstance(error.__cause__, OSError) else "web.certificate"
+                    raise SettingsError(on_page[0].fault(str(error), key)) from error
                 # Nobody asked for the page at this address: another service of this machine may have it.
                 log.warning("%s; no page for now", error)
                 continue

@@ -93,7 +93,9 @@ class Service:
             stack.push_async_callback(history.close)
             servers = {}
             for endpoint in dict.fromkeys(cell.settings.opcua.endpoint for cell in self._cells):
-                servers[endpoint] = await stack.enter_async_context(self._server(endpoint, history))
+                server, cell = self._server(endpoint, history)
+                with cell.told_at("opcua.endpoint"):
+                    servers[endpoint] = await stack.enter_async_context(server)
             shown_by = {cell.name: servers[cell.settings.opcua.endpoint] for cell in self._cells}
             self.endpoints |= {name: server.endpoint for name, server in shown_by.items()}
             pages = await stack.enter_async_context(
@@ -141,23 +143,27 @@ class Service:
             await running.reload()
         systemd.notify("READY=1")
 
-    def _server(self, endpoint: str, history: JournalHistory) -> Server:
+    def _server(self, endpoint: str, history: JournalHistory) -> tuple[Server, CellConfig]:
+        """Make a server, and give the cell whose file tells of it."""
         cells = [cell for cell in self._cells if cell.settings.opcua.endpoint == endpoint]
-        return Server(
+        server = Server(
             server_settings(cells[0]),
             cells[0].settings.opcua.users_file,
             [cell_description(cell) for cell in cells],
             history,
             OperatorCommands(self.running),
         )
+        return server, cells[0]
 
     @contextlib.asynccontextmanager
     async def _monitoring(self) -> AsyncIterator[None]:
-        sections = dict.fromkeys(cell.settings.monitoring for cell in self._cells)
-        listeners = [section for section in sections if section is not None]
+        cells = {cell.settings.monitoring: cell for cell in reversed(self._cells)}
         with contextlib.ExitStack() as stack:
-            for section in listeners:
-                http = stack.enter_context(Monitoring(section.host, section.port, self._health))
+            for section, cell in cells.items():
+                if section is None:
+                    continue
+                with cell.told_at("monitoring.port"):
+                    http = stack.enter_context(Monitoring(section.host, section.port, self._health))
                 log.info("health and metrics at http://%s:%d", http.host, http.port)
             yield
 

@@ -1,5 +1,7 @@
 """Cells read whole: the cell file, the register map and the model that it names."""
 
+import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,6 +32,14 @@ class CellConfig:
     def fault(self, message: str, *keys: str) -> str:
         """Say what is wrong, with the `place` of some keys."""
         return f"{self.place(*keys)}: {message}"
+
+    @contextlib.contextmanager
+    def told_at(self, *keys: str) -> Iterator[None]:
+        """Put the `place` of some keys before what a part of the service refuses of its settings."""
+        try:
+            yield
+        except SettingsError as error:
+            raise SettingsError(self.fault(str(error), *keys)) from error
 
     def place(self, *keys: str) -> str:
         """Say where its file has the first of some keys, as in `journal.file`, or else their section."""

@@ -110,7 +110,7 @@ class PageServer:
         except OSError as error:
             raise SettingsError(
                 f"page: cannot listen on {self._settings.endpoint} ({error.strerror}); "
-                "choose another web.endpoint"
+                "choose another `web.endpoint`, or end what uses it"
             ) from error
         host = url.netloc.rpartition(":")[0]
         self.endpoint = url._replace(netloc=f"{host}:{listener.getsockname()[1]}").geturl()

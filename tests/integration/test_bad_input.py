@@ -5,19 +5,23 @@ import contextlib
 import json
 import logging
 import re
+import socket
 import urllib.error
 import urllib.request
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
-from impactcell.errors import JournalError
+from impactcell.errors import JournalError, SettingsError
 from impactcell.journal.store import Journal
 from impactcell.records import Quality
 from impactcell.scada import Actor, HistoryRequest, RefusedError, Role
+from impactcell.service import Service
 from impactcell.service.history_source import JournalHistory
 from impactcell.service.operator_commands import OperatorCommands
+from impactcell.settings import read_cells
 from tests.integration.processes import CONFIG, simulator, write_cell
 from tests.integration.stepped import stepped
 from tests.integration.watched import serving
@@ -191,3 +195,29 @@ async def test_a_module_that_goes_and_comes_back(tmp_path: Path) -> None:
         await stack.enter_async_context(simulator(tmp_path, strikes=strikes, listen=listen))
         await watched.alarm("press-1", "ModuleConnection", active=False)
         await watched.until("press-1", seen + 3)
+
+
+@pytest.mark.parametrize(
+    ("section", "key", "value"),
+    [
+        ("opcua", "endpoint", "opc.tcp://127.0.0.1:{}/"),
+        ("web", "endpoint", "http://127.0.0.1:{}"),
+        ("monitoring", "port", "{}"),
+    ],
+)
+async def test_a_port_in_use_is_told_with_the_line_that_names_it(
+    tmp_path: Path, section: str, key: str, value: str
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        said = yaml.safe_load(value.format(taken.getsockname()[1]))
+        path = write_cell(tmp_path, 1, **{section: {key: said}})
+        service = Service(read_cells([path]))
+        with pytest.raises(SettingsError, match="Address already in use") as caught:
+            await service.run(asyncio.Event())
+    await service.running["press-1"].close()
+    told = re.fullmatch(
+        rf"{re.escape(str(path))}:(\d+):\d+: .*; choose another (.*), or end what uses it", str(caught.value)
+    )
+    assert told is not None, str(caught.value)
+    assert path.read_text().splitlines()[int(told[1]) - 1] == f"  {key}: {said}"
+    assert f"`{section}.{key}`" in told[2]

@@ -117,7 +117,9 @@ def test_an_address_may_be_of_version_6() -> None:
 def test_a_port_in_use_is_said() -> None:
     with (
         socket.create_server(("127.0.0.1", 0)) as taken,
-        pytest.raises(SettingsError, match="choose another"),
+        pytest.raises(
+            SettingsError, match=r"choose another `monitoring.host` or `monitoring.port`, or end what uses it"
+        ),
     ):
         Monitoring("127.0.0.1", taken.getsockname()[1], list).__enter__()
 
