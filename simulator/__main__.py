@@ -46,6 +46,9 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument(
         "--truth", type=Path, metavar="FILE", help="write what really happened, a JSON line a cycle"
     )
+    serve.add_argument(
+        "--until-stdin-ends", action="store_true", help="end with standard input, as a pipe from a parent"
+    )
     serve.add_argument("-q", "--quiet", action="store_true", help="only errors and the address it listens at")
     serve.add_argument(
         "-v",
@@ -72,7 +75,13 @@ def _serve(options: argparse.Namespace) -> int:
         scenario = scenario.model_copy(
             update={"listen": scenario.listen.model_copy(update={"port": options.port})}
         )
-    return run(scenario, registers, options.truth, verbose=options.verbose)
+    return run(
+        scenario,
+        registers,
+        options.truth,
+        verbose=options.verbose,
+        until_stdin_ends=options.until_stdin_ends,
+    )
 
 
 def _campaign(options: argparse.Namespace) -> int:

@@ -14,7 +14,7 @@ from typing import TextIO
 from impactcell.errors import MapError, SettingsError
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.process import yaml_loader
-from impactcell.process.signals import stop_on_signals
+from impactcell.process.signals import stop_on_end_of_input, stop_on_signals
 from simulator.control import Control
 from simulator.device import Device, Truth
 from simulator.fault_schedule import arm
@@ -82,9 +82,25 @@ def _truths(file: Path | None, *, verbose: bool) -> Iterator[Callable[[Truth], N
 
 
 async def serve(
-    scenario: Scenario, registers: RegisterMap, truth_file: Path | None = None, *, verbose: bool = False
+    scenario: Scenario,
+    registers: RegisterMap,
+    truth_file: Path | None = None,
+    *,
+    verbose: bool = False,
+    until_stdin_ends: bool = False,
 ) -> bool:
     """Serve until SIGTERM or SIGINT; prints one JSON line with the addresses once it listens.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    registers : RegisterMap
+    truth_file : Path, optional
+        Where each truth is written.
+    verbose : bool
+        Each truth is written to standard error, too.
+    until_stdin_ends : bool
+        It ends with standard input, too.
 
     Returns
     -------
@@ -111,7 +127,8 @@ async def serve(
             now_s=loop.time(),
             on_truth=tell,
         )
-        await _serve(scenario, device, stop)
+        with stop_on_end_of_input(stop) if until_stdin_ends else contextlib.nullcontext():
+            await _serve(scenario, device, stop)
     return signal.SIGINT in received
 
 
@@ -156,7 +173,12 @@ async def _serve(scenario: Scenario, device: Device, stop: asyncio.Event) -> Non
 
 
 def run(
-    scenario: Scenario, registers: RegisterMap, truth_file: Path | None = None, *, verbose: bool = False
+    scenario: Scenario,
+    registers: RegisterMap,
+    truth_file: Path | None = None,
+    *,
+    verbose: bool = False,
+    until_stdin_ends: bool = False,
 ) -> int:
     """Serve in an event loop of its own; returns the exit code.
 
@@ -166,7 +188,9 @@ def run(
         Ended by Ctrl-C, after all was put away.
     """
     try:
-        interrupted = asyncio.run(serve(scenario, registers, truth_file, verbose=verbose))
+        interrupted = asyncio.run(
+            serve(scenario, registers, truth_file, verbose=verbose, until_stdin_ends=until_stdin_ends)
+        )
     except OSError as error:
         way_out = "; --port chooses another" if error.errno == errno.EADDRINUSE else ""
         told = f"{scenario.name}: cannot listen or write: {error.strerror or error}{way_out}"

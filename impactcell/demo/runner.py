@@ -18,13 +18,14 @@ from rich.console import Console, RenderableType
 from rich.live import Live
 
 from impactcell.demo.auto_teach import AutoTeach
+from impactcell.demo.endings import end_once, ended_by_signals
 from impactcell.demo.scenario_setup import USER, DemoSetup, set_up_scenario
 from impactcell.demo.targets import number, targets_json, targets_table
 from impactcell.demo.view import Scene, render
 from impactcell.errors import ImpactCellError
 from impactcell.positioning.task_state_machine import TaskOutcome
 from impactcell.process.console import is_quiet, print_note
-from impactcell.process.signals import stop_on_signals
+from impactcell.process.signals import ends_of_terminal, stop_on_signals
 from impactcell.records import ModuleStatus, Snapshot
 from impactcell.records.uncertainty import plus_minus
 from impactcell.service import Service
@@ -62,14 +63,13 @@ def demo(*, cycles: int | None, scenario: str, as_json: bool) -> None:
     KeyboardInterrupt
         After the summary, where Ctrl-C ended it.
     """
-    # Until the event loop takes the signal over, an end has to pass through `set_up_scenario`: it cleans up.
-    signal.signal(signal.SIGTERM, _end)
-    with set_up_scenario(scenario, cycles) as setup:
+    with ended_by_signals(), set_up_scenario(scenario, cycles) as setup:
         run = _DemoRun(setup, cycles)
         if as_json or is_quiet() or not sys.stdout.isatty():
             interrupted = asyncio.run(run.follow(_draw_nothing if as_json or is_quiet() else _print_line))
         else:
             interrupted = asyncio.run(_live(run))
+        end_once()
     if as_json:
         print(json.dumps(run.summary()))  # noqa: T201 - the result of the verb
     elif not is_quiet() and (table := run.table()) is not None:
@@ -110,7 +110,7 @@ class _DemoRun:
 
         self.service = Service([self.setup.cell], observe, {self.setup.cell.name: self.setup.stops})
         watch = asyncio.create_task(self._watch(news, stop))
-        with stop_on_signals(stop) as signals:
+        with stop_on_signals(stop, *ends_of_terminal()) as signals:
             try:
                 await self.service.run(stop, self._started)
             finally:
@@ -245,10 +245,6 @@ class _DemoRun:
             "story": [{"cycle": cycle, "what": text} for cycle, text in self.setup.story],
             "told": [{"cycle": cycle, "what": text} for cycle, text in self.messages],
         }
-
-
-def _end(*_: object) -> None:
-    raise SystemExit(0)
 
 
 async def _live(run: _DemoRun) -> bool:

@@ -176,7 +176,8 @@ def last_target_m(content: dict) -> float:  # type: ignore[type-arg]
 def _simulator(scenario: Path) -> Iterator[int]:
     errors = (scenario.parent / "simulator.log").open("w+", encoding="utf-8")
     process = subprocess.Popen(  # noqa: S603 - our own simulator
-        [sys.executable, "-m", "simulator", "serve", str(scenario)],
+        [sys.executable, "-m", "simulator", "serve", str(scenario), "--until-stdin-ends"],
+        stdin=subprocess.PIPE,  # it ends with this process, whatever ends that
         stdout=subprocess.PIPE,
         stderr=errors,
         text=True,

@@ -2,13 +2,20 @@
 
 import asyncio
 import contextlib
+import os
 import signal
+import sys
 from collections.abc import Iterator
 
 
+def ends_of_terminal() -> tuple[signal.Signals, ...]:
+    """Signals by which a program ends with its terminal; none where nohup keeps it running."""
+    return () if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else (signal.SIGHUP,)
+
+
 @contextlib.contextmanager
-def stop_on_signals(stop: asyncio.Event) -> Iterator[list[signal.Signals]]:
-    """Set `stop` on SIGTERM and on Ctrl-C meanwhile; yields the signals that came, SIGINT being Ctrl-C."""
+def stop_on_signals(stop: asyncio.Event, *others: signal.Signals) -> Iterator[list[signal.Signals]]:
+    """Set `stop` on SIGTERM, Ctrl-C and `others` meanwhile; yields what came, SIGINT being Ctrl-C."""
     loop = asyncio.get_running_loop()
     received: list[signal.Signals] = []
 
@@ -16,11 +23,30 @@ def stop_on_signals(stop: asyncio.Event) -> Iterator[list[signal.Signals]]:
         received.append(number)
         stop.set()
 
-    numbers = (signal.SIGTERM, signal.SIGINT)
-    for number in numbers:
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGINT, *others)}
+    for number in before:
         loop.add_signal_handler(number, end, number)
     try:
         yield received
     finally:
-        for number in numbers:
+        for number, handler in before.items():
             loop.remove_signal_handler(number)
+            signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def stop_on_end_of_input(stop: asyncio.Event) -> Iterator[None]:
+    """Set `stop` when standard input ends meanwhile, as a pipe does with the process at its other end."""
+    loop = asyncio.get_running_loop()
+    descriptor = sys.stdin.fileno()
+
+    def look() -> None:
+        if not os.read(descriptor, 4096):
+            loop.remove_reader(descriptor)
+            stop.set()
+
+    loop.add_reader(descriptor, look)
+    try:
+        yield
+    finally:
+        loop.remove_reader(descriptor)

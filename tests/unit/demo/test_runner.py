@@ -1,7 +1,10 @@
 """When a demo is over."""
 
 import asyncio
+import contextlib
 import math
+import signal
+from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
@@ -11,6 +14,7 @@ import pytest
 from impactcell.demo import runner
 from impactcell.demo.scenario_setup import DemoSetup, last_target_m
 from impactcell.errors import ImpactCellError
+from impactcell.process.signals import ends_of_terminal, stop_on_signals
 from impactcell.records import PositioningState
 from tests.snapshots import make_capture, make_snapshot
 from tests.virtual_time import run_virtually
@@ -39,6 +43,70 @@ def test_a_demo_with_a_last_part_ends_with_it(
 
     assert run_virtually(watched()) == (over, over)
     assert playing.messages == ([(7, "that was the last part")] if over else [])
+
+
+@pytest.fixture
+def kept_signals() -> Iterator[None]:
+    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
+
+
+def setting_up(monkeypatch: pytest.MonkeyPatch, *signals: signal.Signals) -> list[str]:
+    """Have a demo met by signals while it is set up; the list tells what was done."""
+    done: list[str] = []
+
+    @contextlib.contextmanager
+    def set_up(*_: object) -> Iterator[None]:
+        try:
+            for number in signals:
+                signal.raise_signal(number)
+            yield
+        finally:
+            for number in (signal.SIGHUP, signal.SIGTERM):  # a second one does not stop the tidying up
+                signal.raise_signal(number)
+            done.append("put away")
+
+    monkeypatch.setattr(runner, "set_up_scenario", set_up)
+    return done
+
+
+@pytest.mark.usefixtures("kept_signals")
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_demo_that_is_ended_while_it_is_set_up_leaves_nothing_behind(
+    monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    done = setting_up(monkeypatch, number)
+    with pytest.raises(SystemExit) as ended:
+        runner.demo(cycles=None, scenario="demo", as_json=True)
+    assert (ended.value.code, done) == (0, ["put away"])
+
+
+@pytest.mark.usefixtures("kept_signals")
+@pytest.mark.parametrize("ignored", [False, True])
+def test_a_demo_ends_with_its_terminal_unless_nohup_keeps_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], ignored: bool
+) -> None:
+    done = setting_up(monkeypatch)
+    signal.signal(signal.SIGHUP, signal.SIG_IGN if ignored else signal.SIG_DFL)
+    ended_by: list[signal.Signals] = []
+
+    async def follow(self: object, draw: object) -> bool:
+        stop = asyncio.Event()
+        with stop_on_signals(stop, *ends_of_terminal()) as received:
+            signal.raise_signal(signal.SIGHUP)
+            if ignored:
+                signal.raise_signal(signal.SIGTERM)
+            await stop.wait()
+        ended_by.extend(received)
+        return False
+
+    monkeypatch.setattr(runner._DemoRun, "follow", follow)
+    monkeypatch.setattr(runner._DemoRun, "summary", lambda _: {})
+    runner.demo(cycles=None, scenario="demo", as_json=True)
+    assert ended_by == [signal.SIGTERM if ignored else signal.SIGHUP]
+    assert (done, capsys.readouterr().out) == (["put away"], "{}\n")
 
 
 @pytest.mark.parametrize("seen", [0, 1])

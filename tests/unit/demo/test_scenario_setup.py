@@ -3,6 +3,9 @@
 import contextlib
 import logging
 import socket
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 import yaml
@@ -59,6 +62,32 @@ def test_a_demo_says_when_its_tour_is_over(scenario: str) -> None:
         assert max(cycle for cycle, _ in story(content)) == 90
     else:  # a last part ends the one, a new model the other
         assert said == ()
+
+
+def test_the_simulator_ends_with_a_demo_that_is_killed(tmp_path: Path) -> None:
+    text = (CONFIG / "sim" / "demo.yaml").read_text(encoding="utf-8")
+    (tmp_path / "s.yaml").write_text(text.replace("../maps", str(CONFIG / "maps")), encoding="utf-8")
+    program = (
+        "import sys, pathlib\n"
+        "from impactcell.demo.scenario_setup import _simulator\n"
+        "with _simulator(pathlib.Path(sys.argv[1])) as port:\n"
+        "    print(port, flush=True)\n"
+        "    sys.stdin.read()\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program, str(tmp_path / "s.yaml")],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=scenario_setup.ROOT,
+    ) as process:
+        assert process.stdout is not None
+        port = int(process.stdout.readline())
+        socket.create_connection(("127.0.0.1", port)).close()
+        process.kill()
+    with contextlib.suppress(ConnectionRefusedError, ConnectionResetError):
+        while True:  # the suite's own timeout ends it
+            socket.create_connection(("127.0.0.1", port)).close()
 
 
 def test_a_demo_that_nobody_ends_keeps_a_friction_that_its_model_knows() -> None:

@@ -290,6 +290,23 @@ def test_serves_until_it_is_told_to_stop(tmp_path: Path, how: signal.Signals, co
     assert lines[0]["mu_s"] == pytest.approx(0.2, rel=0.05)
 
 
+def test_it_ends_with_its_parent_where_asked_to(tmp_path: Path) -> None:
+    scenario = (CONFIG / "sim" / "demo.yaml").read_text().replace("../maps", str(CONFIG / "maps"))
+    (tmp_path / "s.yaml").write_text(scenario)
+    command = [sys.executable, "-m", "simulator", "serve", str(tmp_path / "s.yaml"), "--until-stdin-ends"]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=CONFIG.parent
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        port = json.loads(process.stdout.readline())["port"]
+        process.stdin.write("what is said is not looked at")
+        process.stdin.flush()
+        assert read_registers(port, 0, 8).rstrip(b"\0") == b"IMPACT-FPGA"
+        process.stdin.close()
+        assert process.wait(timeout=PATIENCE_S) == 0
+
+
 def test_a_port_that_is_taken(taken_port: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["serve", str(CONFIG / "sim" / "demo.yaml"), "--port", taken_port]) == 1
     told = capsys.readouterr().err
