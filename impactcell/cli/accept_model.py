@@ -2,11 +2,12 @@
 
 import json
 import math
+import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from impactcell.cell import in_place_of
 from impactcell.cli.calibrate import calibrated_model
@@ -18,9 +19,14 @@ from impactcell.physics.law_table import NOMINAL_PARAMETERS
 from impactcell.prediction import Model
 from impactcell.process.console import print_note, print_result
 from impactcell.process.whole_files import write_whole
+from impactcell.records.uncertainty import plus_minus
 from impactcell.settings import CellConfig, read_cell
 from impactcell.settings.judgement import judge_cell
 from impactcell.settings.model_file import read_model, write_model
+
+ORIGINS: Final = {"fitted to": "fitted to", "from": "found in", "plant": "plant:"}
+"""How a provenance tells where a plant comes from, as it is said: that of `model fit`, of `discrepancy`,
+and of a model that comes with the program."""
 
 
 def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: bool = False) -> None:
@@ -40,7 +46,7 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
         The cell's journal cannot be read.
     """
     cell_config = read_cell(cell)
-    model, own_taps = _judged(cell_config, read_model(extended), anyway=anyway)
+    model, own_taps = _judged(cell_config, extended, anyway=anyway)
     is_new = in_place_of(cell_config.model, model) != cell_config.model
     sharing = cells_sharing(cell_config)
     previous = put_into_service(cell_config, model)
@@ -62,7 +68,7 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
     )
 
 
-def _judged(config: CellConfig, extended: Model, *, anyway: bool) -> tuple[Model, OwnTaps | None]:
+def _judged(config: CellConfig, extended: Path, *, anyway: bool) -> tuple[Model, OwnTaps | None]:
     """Calibrate a model for the cell, and look at the cell's own taps with it; nothing is written yet.
 
     Raises
@@ -71,10 +77,12 @@ def _judged(config: CellConfig, extended: Model, *, anyway: bool) -> tuple[Model
         Why it cannot be put into service.
     """
     check_output(previous_model(config.settings.model), SettingsError)
-    model = calibrated_model(replace(config, model=extended))
+    model = calibrated_model(replace(config, model=read_model(extended)))
     own_taps = compare_on_own_taps(config, model)
     if own_taps is not None and own_taps.speaks_against and not anyway:
-        told = f"model {model.name} is not put into service (--anyway would)"
+        files = [str(file.absolute()) for file in (config.path, extended)]
+        command = shlex.join(["impactcell", "model", "accept", *files, "--anyway"])
+        told = f"model {model.name} is not put into service (`{command}` would)"
         raise PredictionError(f"{config.name}: {told}: {own_taps.sentence}")
     return model, own_taps
 
@@ -152,9 +160,23 @@ def restore_model(cell: Path, *, as_json: bool = False) -> None:
         )
     _tell(
         {"cell": cell_config.name, "model": model.name, "previous": str(previous)},
-        f"{cell_config.name} runs with model {model.name} from the next cycle on, as before",
+        f"{cell_config.name} runs with model {model.name} from the next cycle on, as before\n"
+        f"{_plant(model)}\n`{shlex.join(['impactcell', 'model', 'restore', str(cell)])}` again undoes it",
         as_json=as_json,
     )
+
+
+def _plant(model: Model) -> str:
+    """Tell a model's parameters with what is told of their standard deviations, and where they come from."""
+    plant, prior, said = model.plant, model.prior, model.provenance
+    stiffness = plus_minus(plant.stiffness_n_per_m, prior.stiffness_std_n_per_m, ".6g", ".0f")
+    damping = plus_minus(plant.damping_n_s_per_m, prior.damping_std_n_s_per_m, ".5g", ".3g")
+    ratio = plus_minus(model.ratio, prior.ratio_std, ".4f", ".2g")
+    origin = next(
+        (f"; {how} {said[key]}" for key, how in ORIGINS.items() if key in said and not model.is_provisional),
+        "",
+    )
+    return f"k {stiffness} N/m, b {damping} N s/m, mu_k/mu_s {ratio} (± is 95 %){origin}"
 
 
 def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json: bool = False) -> None:
@@ -169,7 +191,7 @@ def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json:
     before, after = cell_config.model, read_model(extended)
     refusal, own_taps = None, None
     try:
-        _, own_taps = _judged(cell_config, after, anyway=anyway)
+        _, own_taps = _judged(cell_config, extended, anyway=anyway)
     except ImpactCellError as error:
         refusal = error
     changes = [

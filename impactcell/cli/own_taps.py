@@ -56,7 +56,14 @@ class OwnTaps:
 
 
 def _follows(gap: float) -> str:
-    return "can follow none" if math.isnan(gap) else f"leaves {gap:.3g} times the sensors' noise"
+    if math.isnan(gap):
+        return "can follow none"
+    times = f"{gap:.3g}"
+    return (
+        "leaves no more than the sensors' noise"
+        if times == "1"
+        else f"leaves {times} times the sensors' noise"
+    )
 
 
 def compare_on_own_taps(config: CellConfig, after: Model) -> OwnTaps | None:

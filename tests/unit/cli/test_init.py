@@ -347,6 +347,8 @@ def test_the_first_taps_of_the_journal_make_the_model(
     run("model", "restore", cell)
     assert read_cell(cell).model.name == "own-provisional"
     assert "nothing of it was measured" in capsys.readouterr().err
+    run("model", "restore", cell)
+    assert f"fitted to {told['used']} taps of journal " in capsys.readouterr().out
 
 
 def change(content: dict[str, Any], path: str, value: Any) -> None:

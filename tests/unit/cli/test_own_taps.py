@@ -5,6 +5,7 @@ import json
 import math
 import os
 import re
+import shlex
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -95,11 +96,13 @@ def test_a_model_of_another_plant_is_put_into_service_only_if_that_is_meant(
 ) -> None:
     other, before = cell.parent / "other.yaml", read_cell(cell).model
     write_model(oily(before), other)
-    with pytest.raises(PredictionError, match=r"\(--anyway would\): of the cell's last 12 taps it leaves"):
+    with pytest.raises(PredictionError, match="of the cell's last 12 taps it leaves") as refused:
         run_verb(["model", "accept", str(cell), str(other)])
     assert read_cell(cell).model == before
+    told_command = re.search(r"is not put into service \(`impactcell (.*)` would\): of", str(refused.value))
+    assert told_command is not None
     with pytest.raises(SystemExit) as ended:
-        run_verb(["model", "accept", str(cell), str(other), "--anyway", "--json"])
+        run_verb([*shlex.split(told_command[1]), "--json"])
     assert ended.value.code == 0
     told = json.loads(capsys.readouterr().out)["own_taps"]
     assert told["taps"] == 12
@@ -239,10 +242,19 @@ def bar(monkeypatch: pytest.MonkeyPatch, barred: str) -> None:
     monkeypatch.setattr(Path, "write_bytes", write_bytes)
 
 
-def test_the_model_before_comes_back_and_the_one_in_service_takes_its_place(accepted: Path) -> None:
+def test_the_model_before_comes_back_and_the_one_in_service_takes_its_place(
+    accepted: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     before = files(accepted.parent)
+    capsys.readouterr()
     with pytest.raises(SystemExit):
         run_verb(["model", "restore", str(accepted)])
+    said = capsys.readouterr().out
+    assert (
+        "own runs with model prototype from the next cycle on, as before\nk 650000 ± 13000 N/m, b 465 ± 18.6 "
+        "N s/m, mu_k/mu_s 0.7600 ± 0.046 (± is 95 %); plant: the paper's prototype as reconstructed; "
+    ) in said
+    assert said.endswith(f"`impactcell model restore {accepted}` again undoes it\n")
     assert read_cell(accepted).model == read_cell(CONFIG / "cells" / "prototype.yaml").model
     after = files(accepted.parent)
     assert sorted(after) == ["model.previous.yaml", "model.yaml"]

@@ -7,9 +7,11 @@ import pytest
 from impactcell.cli.own_taps import OwnTaps
 from impactcell.web.messages import Messages
 
+COMMAND = "impactcell model accept '/srv/my cell.yaml' /srv/studies/7/results/model.extended.yaml --anyway"
+
 
 def refusal(own: OwnTaps, model: str = "oil") -> str:
-    return f"press-1: model {model} is not put into service (--anyway would): {own.sentence}"
+    return f"press-1: model {model} is not put into service (`{COMMAND}` would): {own.sentence}"
 
 
 def test_both_figures_and_the_way_out_are_said_in_either_language() -> None:
@@ -19,8 +21,8 @@ def test_both_figures_and_the_way_out_are_said_in_either_language() -> None:
     assert german == (
         "press-1: Modell oil wird nicht übernommen, denn die eigenen Stöße der Zelle sprechen dagegen: "
         "bei den letzten 30 lässt es das 7,12-Fache des Sensorrauschens übrig, 2 Schätzungen sind "
-        "brauchbar; das jetzige Modell lässt das 1-Fache des Sensorrauschens übrig, 30 sind es. Sind die "
-        "Messungen aus dieser Zelle? Soll das Modell dennoch gelten: „impactcell model accept --anyway“."
+        "brauchbar; das jetzige Modell lässt nicht mehr als das Sensorrauschen übrig, 30 sind es. Sind die "
+        f"Messungen aus dieser Zelle? Soll das Modell dennoch gelten: „{COMMAND}“."
     )
     language, english = Messages("en").fault(told)
     assert language == "en"
@@ -28,6 +30,16 @@ def test_both_figures_and_the_way_out_are_said_in_either_language() -> None:
         "of the last 30 it leaves 7.12 times the sensors' noise, 2 estimates are usable; the model in"
         in english
     )
+    assert "the model in service leaves no more than the sensors' noise, 30 are. Were" in english
+    assert english.endswith(f"“{COMMAND}” takes it.")
+
+
+def test_what_was_stored_of_a_refusal_is_said_too() -> None:
+    told = refusal(OwnTaps(30, 1.0, 7.123, 30, 2)).replace(f"`{COMMAND}`", "--anyway")
+    told = told.replace("no more than", "1 times")
+    german = Messages("de").fault(told)[1]
+    assert "das jetzige Modell lässt nicht mehr als das Sensorrauschen übrig, 30 sind es." in german
+    assert german.endswith("„impactcell model accept --anyway“.")
 
 
 def test_the_model_is_called_by_its_effects_in_words() -> None:
