@@ -2,8 +2,9 @@
 
 from impactcell.features.channels import CheckedChannel, CheckedForce
 from impactcell.features.extraction import Fault, Features, extract, required
+from impactcell.features.held_drive import drive_noise_std, is_command, samples_held
 from impactcell.features.measured import MeasuredFeature
-from impactcell.features.noise import drive_noise_std, is_command, noise_std, samples_held, white_noise_std
+from impactcell.features.noise import noise_std, white_noise_std
 from impactcell.features.segment import SlideSegment
 from impactcell.features.slide import SlideFeatures
 from impactcell.features.spikes import without_spikes

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from impactcell.numerics.local_polynomial import median_third_difference
 from impactcell.records import Channel, Samples
@@ -21,16 +20,6 @@ that is three steps wide 9 in 100 are."""
 TRIMMED_STD, TRIMMED_STEPS, TRIMMING_ROUNDS = 5.0, 8.0, 3
 """Third differences on a raster that are left out, in their own standard deviations and in its steps, of
 which rounding alone makes up to four; jumps and spikes are gone after so many rounds."""
-MAX_UPDATES = 0.55
-"""Share of samples that differ from the one before, up to which a drive is held from update to update."""
-SWITCHED_LEVELS = 3
-"""Values that a drive takes up to which it is switched: on, off and the other way."""
-MIN_JUMP_STEPS = 4.0
-"""Usual jump of a held drive, in least differences between its values: a coarse code goes by one or two."""
-MIN_UPDATES = 8
-"""Of a drive, below which they show no noise."""
-COMMAND_SHARE = 0.25
-"""Apparent noise of the updates over their spread, above which each is chosen by itself."""
 MIN_RELATIVE_NOISE = 1e-9
 """Noise over the largest value below which a channel without any is taken to have this: rounding of data."""
 
@@ -73,54 +62,3 @@ def white_noise_std(values: Samples) -> float:
         largest = max(TRIMMED_STD * float(third.std()), TRIMMED_STEPS * step)
         third = third[np.abs(third) <= largest]
     return max(float(third.std()) / THIRD_DIFFERENCE_STD, step / math.sqrt(12.0))
-
-
-def drive_noise_std(values: Samples) -> float:
-    """Estimate the noise of a drive, which may be held from one update to the next.
-
-    Of a drive that is not held it is `white_noise_std`. What is held shows no noise between its updates; if
-    it was measured, its updates do, as any samples, and white noise of the same density is the root of how
-    many samples one is held larger. A command has none: 0.
-    """
-    places = _updates(values)
-    if not len(places):
-        return white_noise_std(values)
-    if is_command(values):
-        return 0.0
-    return white_noise_std(values[places]) * math.sqrt(samples_held(values))
-
-
-def samples_held(values: Samples) -> float:
-    """Count the samples for which a measured drive is held; 1 for one that is not, and for a command."""
-    if is_command(values) or not len(places := _updates(values)):
-        return 1.0
-    return float(np.median(np.diff(places)))
-
-
-def is_command(values: Samples) -> bool:
-    """Whether a drive is held and its updates differ as if each were chosen by itself.
-
-    As of a drive that is switched to and fro or takes random levels: what was measured goes on from one
-    update to the next.
-    """
-    places = _updates(values)
-    if not len(places):
-        return False
-    updates = values[places]
-    if len(updates) < MIN_UPDATES or len(np.unique(values)) <= SWITCHED_LEVELS:
-        return True
-    return white_noise_std(updates) > COMMAND_SHARE * float(updates.std())
-
-
-def _updates(values: Samples) -> NDArray[np.int64]:
-    """Places from which on a held drive has another value; none where it is not held."""
-    steps = np.diff(values)
-    places: NDArray[np.int64] = np.flatnonzero(steps) + 1
-    if not 0 < len(places) <= MAX_UPDATES * len(steps):
-        return places[:0]
-    levels = np.unique(values)
-    raster = float(np.diff(levels).min())
-    jump = float(np.median(np.abs(steps[places - 1])))
-    if len(levels) > SWITCHED_LEVELS and jump < MIN_JUMP_STEPS * raster:
-        return places[:0]  # a coarse code, one step after the other
-    return places

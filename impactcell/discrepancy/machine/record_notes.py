@@ -18,7 +18,8 @@ def notes_of_records(base: BaseModel, records: Sequence[UniformRecord]) -> list[
     if commands:
         notes.append(
             f"The force is held from one update to the next in {commands} of {len(records)} records: it was "
-            "taken for a command without noise, which acts from its sample to the next."
+            "taken for a command without noise but for one that is stated, which acts from its sample to the "
+            "next."
         )
     unstated = [record for record in records if record.summed_up and not record.noise_is_stated[0]]
     if unstated:

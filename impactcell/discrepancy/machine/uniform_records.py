@@ -239,11 +239,15 @@ def _force_noise(force: Channel, clean: Samples, step_s: float) -> tuple[float, 
 
     On the line between two samples noise has two thirds of a sample's variance in the mean, but its values go
     together: m of them, of one sample, add up to m times its error, as if each had sqrt(m) times that by
-    itself. Rows average over many. So it is where a force stays the same for m values.
+    itself. Rows average over many. So it is where a force stays the same for m values. Levels that were
+    chosen are no raster.
     """
     slower = max(float(np.median(np.diff(force.time_s))) / step_s, 1.0)
     held = samples_held(clean)
-    noise = drive_noise_std(clean) if force.noise_std is None else noise_std(force) * math.sqrt(held)
+    if force.noise_std is None:
+        noise = drive_noise_std(clean)
+    else:
+        noise = force.noise_std if is_command(clean) else noise_std(force) * math.sqrt(held)
     return noise * math.sqrt(slower), held * slower
 
 

@@ -156,7 +156,7 @@ NOTES: Final[Patterns] = (
      r"Die Spalte '\1' von shots.csv ist in \2 von \3 Messungen leer: Nach ihr wird nichts beurteilt."),
     (r"The force is held from one update to the next in (\d+) of (\d+) records: .*",
      (r"Die Kraft wird in \1 von \2 Messungen von einem Wert zum nächsten gehalten: Sie gilt als Vorgabe "
-      r"ohne Rauschen, die von ihrem Messwert bis zum nächsten wirkt.")),
+      r"ohne Rauschen außer einem angegebenen, die von ihrem Messwert bis zum nächsten wirkt.")),
     (r"The intervals of what is named do not include what remains: .*",
      "Die Intervalle des Benannten schließen nicht ein, was bleibt: Die Werte können außerhalb liegen."),
     (r"The position was summed up from a speed in (\d+) of (\d+) records, .* state (\w+) in .*",
