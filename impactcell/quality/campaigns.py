@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from impactcell.campaign import Campaign, Coordinate, Excitation
+from impactcell.campaign import Campaign, Excitation
 from impactcell.campaign.contents import CHANNELS
 from impactcell.errors import CampaignError
 from impactcell.numerics.spikes import noise_of
@@ -37,7 +37,7 @@ def inspect_campaign(campaign: Campaign) -> tuple[DataFault, ...]:
             channel = getattr(shot, name)
             if channel is not None:
                 data_faults += channel_faults(name, channel, shot.cycle)
-        motion = slides(shot, "rad" if campaign.coordinate is Coordinate.ROTATION else "m")
+        motion = slides(shot, campaign.coordinate)
         if motion is not None:
             data_faults.append(motion)
     data_faults += _copied(campaign.shots)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from impactcell.campaign import Coordinate
 from impactcell.campaign.contacts import baseline_of
 from impactcell.numerics.spikes import noise_of
 from impactcell.quality.data_fault import DataFault, Fault
@@ -29,12 +30,12 @@ MIN_CONTACT_SAMPLES = 20
 """Samples of a contact by which its lateness can be told."""
 
 
-def slides(shot: Capture, unit: str) -> DataFault | None:
+def slides(shot: Capture, coordinate: Coordinate) -> DataFault | None:
     """Say whether a recorded part moves beyond noise, and stays where it has moved to; None where it does.
 
-    `unit`: of the position, as it is told.
+    What turns and comes back without a drive swings: it has no place to stay at.
     """
-    position = shot.position
+    position, unit = shot.position, "rad" if coordinate is Coordinate.ROTATION else "m"
     if position is None or len(position.values) < MIN_CONTACT_SAMPLES or np.ptp(position.values) == 0.0:
         return None
     values, noise = position.values, noise_of(position.values)
@@ -59,7 +60,7 @@ def slides(shot: Capture, unit: str) -> DataFault | None:
             )
             return DataFault(Fault.PRESLIDING_ONLY, "position", told, shot.cycle)
         return None
-    if moved < max(spread, 0.02 * excursion):
+    if coordinate is Coordinate.TRANSLATION and moved < max(spread, 0.02 * excursion):
         told = (
             f"the part never slides: it moves by {excursion:.3g} {unit} and springs back, so all is "
             f"presliding; strike it harder"
