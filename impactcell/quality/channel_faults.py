@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from impactcell.features import white_noise_std
+from impactcell.features import is_command, white_noise_std
 from impactcell.features.clipping import is_cut_off
 from impactcell.numerics.raster import raster_of
 from impactcell.numerics.spikes import noise_of, spike_samples
@@ -41,6 +41,11 @@ def channel_faults(name: str, channel: Channel, shot: int) -> list[DataFault]:
     ]
 
 
+def ends_of_range(name: str, channel: Channel) -> tuple[float, ...]:
+    """Values at which a channel is clipped."""
+    return tuple(fault.end for fault in channel_faults(name, channel, 0) if fault.end is not None)
+
+
 def _spikes(name: str, channel: Channel, shot: int) -> list[DataFault]:
     values = channel.values
     spikes = spike_samples(values)
@@ -60,6 +65,8 @@ def _plateaus(name: str, channel: Channel, shot: int) -> list[DataFault]:
     values = channel.values
     if name == "actuator" or noise_of(values) == 0.0:
         return []  # an actuator halts, and without noise rest is a plateau
+    if name == "force" and is_command(values):
+        return []  # its levels are what was chosen
     starts, lengths = _equal_runs(values)
     # Where noise is less than a step of the raster, rest is a plateau too.
     is_coarse = (raster_of(values) or 0.0) > white_noise_std(values)

@@ -81,7 +81,7 @@ def test_the_simulation_begins_anew_after_each_gap() -> None:
 
 def test_records_that_are_cut_to_pieces_are_refused() -> None:
     gaps = [(number, 0.05 + 0.1 * place, 0.05) for number in range(1, 5) for place in range(119)]
-    with pytest.raises(CampaignError, match="samples are missing so often that between the gaps"):
+    with pytest.raises(CampaignError, match="samples are missing or clipped so often that between the gaps"):
         investigate_machine(with_gaps(gaps), SLIDE)
 
 

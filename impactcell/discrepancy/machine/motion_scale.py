@@ -38,8 +38,8 @@ LEVELLED = 1.02
 MAX_NOISE_SHARE = 0.1
 """Share of the sensor's noise in the mean square of an acceleration beyond which it says nothing [1]."""
 TOO_MANY_GAPS = (
-    "samples are missing so often that between the gaps nothing is long enough for the equation of motion; "
-    "record without gaps, or a slower motion in more samples"
+    "samples are missing or clipped so often that between the gaps nothing is long enough for the equation "
+    "of motion; record without gaps, in a wider range, or a slower motion in more samples"
 )
 """Where no stretch of a record between its gaps is long enough."""
 

@@ -1,9 +1,10 @@
-"""What is said of records beside what is found in them: spikes, commands, positions that were summed up."""
+"""What is said of records beside what is found in them: spikes, commands, clipping, sums."""
 
 from collections.abc import Sequence
 
 from impactcell.campaign import COLUMNS
 from impactcell.discrepancy.machine.base_model import BaseModel
+from impactcell.discrepancy.machine.lost_stretches import MOST_CLIPPED
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 
 
@@ -29,5 +30,22 @@ def notes_of_records(base: BaseModel, records: Sequence[UniformRecord]) -> list[
             "noise adds up: that was read off neighbouring samples of the speed and taken for white. Of a "
             "speed that was filtered, or made from an encoder's counts, it is not: "
             f"state {key} in campaign.yaml, or record the position itself."
+        )
+    return [*notes, *_notes_of_clipping(records)]
+
+
+def _notes_of_clipping(records: Sequence[UniformRecord]) -> list[str]:
+    """Say in how many records something is clipped and left out, and in how many the drive ends there."""
+    notes = []
+    if clipped := sum(record.clipped > 0 for record in records):
+        notes.append(
+            f"Clipped samples of {clipped} of {len(records)} records are left out: nothing counts that lies "
+            "in them or near them, and simulations of what is held out begin anew after them."
+        )
+    if limited := sum(record.at_limit for record in records):
+        notes.append(
+            f"In {limited} of {len(records)} records the force stands at an end of its range for more than "
+            f"{100.0 * MOST_CLIPPED:.0f} % of the time: it was taken for what drives, as of a controller at "
+            "its limit. If it is the recorder's range that ends there, choose a wider one."
         )
     return notes

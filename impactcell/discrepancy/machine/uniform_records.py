@@ -1,25 +1,30 @@
 """Records of a machine at equal steps, without spikes."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from impactcell.campaign import Campaign
-from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response
-from impactcell.discrepancy.machine.channel_values import ABOUT, cleaned_position, held_mean, without_spikes
+from impactcell.discrepancy.machine.base_model import BaseModel, Response
+from impactcell.discrepancy.machine.channel_values import cleaned_position, held_mean, without_spikes
+from impactcell.discrepancy.machine.lost_stretches import (
+    MOST_CLIPPED,
+    Gaps,
+    as_it_was_beside,
+    clipped_samples,
+    gaps_of,
+    sound_neighbours,
+)
 from impactcell.discrepancy.machine.smoothing import of_speeds, slope_weights
 from impactcell.errors import CampaignError
 from impactcell.features import drive_noise_std, is_command, noise_std, samples_held, white_noise_std
-from impactcell.quality import gaps_in_time
 from impactcell.records import Capture, Channel, Samples
 
 MIN_HALF_SUPPORT = 5
 """Least half support of a test function [samples]: fewer do not average the noise of a sensor."""
-Gaps = tuple[tuple[float, float], ...]
-"""Begin and end of each stretch of time within which samples are missing [s], in their order."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,8 +56,12 @@ class UniformRecord:
     finer : int
         Samples made of one of the sensors'. Noise is what white noise of the same density has.
     gaps : tuple of (float, float)
-        Time from the last sample before to the first one after which one of the channels has none. Values
-        between are straight lines, and nothing that was measured.
+        Time from the last sample before to the first one after a stretch in which one of the channels has
+        none, or is clipped. What values there are between is nothing that was measured.
+    clipped : int
+        Samples of a channel that are clipped, and so in a gap.
+    at_limit : bool
+        The force stands at an end of its range so often that it is its drive's own, and counts.
     """
 
     shot: int
@@ -68,6 +77,8 @@ class UniformRecord:
     force_span: float = 1.0
     finer: int = 1
     gaps: Gaps = ()
+    clipped: int = 0
+    at_limit: bool = False
     command: Samples | None = None
     summed_up: bool = False
 
@@ -174,9 +185,16 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         )
     time = begin + step * np.arange(count)
     is_held = len(channels) > 1 and base.response is Response.POSITION and is_command(channels[1].values)
+    clipped = [
+        clipped_samples(name, channel) for name, channel in zip(("position", "force"), channels, strict=False)
+    ]
+    at_limit = bool(clipped[1:]) and float(clipped[1].mean()) > MOST_CLIPPED
+    if at_limit:
+        clipped[1][:] = False
+    lost = [sound_neighbours(one.time_s, beyond) for one, beyond in zip(channels, clipped, strict=True)]
     cleaned = [
-        _as_it_was_at_gaps(channel, *clean(channel.values))
-        for channel, clean in zip(channels, (cleaned_position, without_spikes), strict=False)
+        as_it_was_beside(around, channel, *clean(channel.values))
+        for around, channel, clean in zip(lost, channels, (cleaned_position, without_spikes), strict=False)
     ]
     values = [
         np.interp(time, channel.time_s, clean) for channel, (clean, _) in zip(channels, cleaned, strict=True)
@@ -210,7 +228,9 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         noise=(noise, abs(gain) * force_noise),
         noise_is_stated=(stated, channels[-1].noise_std is not None),
         force_span=force_span,
-        gaps=_gaps(channels, base.delay_s, begin),
+        gaps=gaps_of(channels, lost, base.delay_s, begin),
+        clipped=sum(int(beyond.sum()) for beyond in clipped),
+        at_limit=at_limit,
         command=None if command is None else gain * command + base.force_offset.value,
         summed_up=shot.position.summed_up,
     )
@@ -249,30 +269,3 @@ def _force_noise(force: Channel, clean: Samples, step_s: float) -> tuple[float, 
     else:
         noise = force.noise_std if is_command(clean) else noise_std(force) * math.sqrt(held)
     return noise * math.sqrt(slower), held * slower
-
-
-def _as_it_was_at_gaps(channel: Channel, cleaned: Samples, replaced: int) -> tuple[Samples, int]:
-    """Take back what was replaced beside a gap, where a motion that went on looks like an outlier."""
-    gaps = gaps_in_time(channel.time_s)
-    if not gaps.size:
-        return cleaned, replaced
-    for place in gaps + 1:
-        beside = slice(max(place - ABOUT, 0), place + ABOUT)
-        cleaned[beside] = channel.values[beside]
-    return cleaned, int(np.count_nonzero(cleaned != channel.values))
-
-
-def _gaps(channels: Sequence[Channel], delay: NumberPrior, begin_s: float) -> Gaps:
-    """Where position or force have no samples: of the force, however late it may have been recorded."""
-    found = []
-    for channel, (early_s, late_s) in zip(channels, ((0.0, 0.0), delay.reach), strict=False):
-        for place in gaps_in_time(channel.time_s):
-            low, high = channel.time_s[place : place + 2] - begin_s
-            found.append((float(low) - late_s, float(high) - early_s))
-    gaps: list[tuple[float, float]] = []
-    for low, high in sorted(found):
-        if gaps and low <= gaps[-1][1]:
-            gaps[-1] = gaps[-1][0], max(gaps[-1][1], high)
-        else:
-            gaps.append((low, high))
-    return tuple(gaps)

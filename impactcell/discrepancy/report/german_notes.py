@@ -147,6 +147,13 @@ NOTES: Final[Patterns] = (
     (r"Outliers of (\d+) shots are left out of the fits\.", r"Ausreißer werden nicht angepasst (Stöße: \1)."),
     (r"Clipped samples of (\d+) shots are left out of the fits\.",
      r"Begrenzte Messwerte werden nicht angepasst (Stöße: \1)."),
+    (r"Clipped samples of (\d+) of (\d+) records are left out: .*",
+     (r"Begrenzte Messwerte sind in \1 von \2 Messungen ausgelassen: Was in ihnen oder nahe bei ihnen liegt, "
+      r"zählt nicht, und Simulationen des Zurückgehaltenen beginnen nach ihnen neu.")),
+    (r"In (\d+) of (\d+) records the force stands at an end of its range for more than (\d+) % of .*",
+     (r"In \1 von \2 Messungen steht die Kraft mehr als \3 % der Zeit an einem Ende ihres Bereichs: Sie gilt "
+      r"als das, was antreibt, wie bei einem Regler an seiner Grenze. Endet dort der Messbereich, einen "
+      r"weiteren wählen.")),
     (r"(\d+) of (\d+) samples stood far from their neighbours and were replaced\.",
      r"\1 von \2 Messwerten lagen weit von ihren Nachbarn und wurden ersetzt."),
     (r"Shot (\d+): what lies before (\S+) s is left out, since the swing grows until then: .*",
