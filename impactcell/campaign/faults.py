@@ -58,8 +58,8 @@ class Faults:
         return len(self._messages)
 
 
-def read_text(file: Path, faults: Faults) -> str | None:
-    """Text of `file`, or None after noting why it cannot be read."""
+def read_text(file: Path, faults: Faults, if_missing: str) -> str | None:
+    """Text of `file`, or None after noting why it cannot be read; `if_missing` is the way out of that."""
     try:
         status = file.stat()
         if not stat.S_ISREG(status.st_mode):
@@ -69,7 +69,7 @@ def read_text(file: Path, faults: Faults) -> str | None:
         else:
             return file.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
-        faults.add(file, None, "is missing")
+        faults.add(file, None, f"is missing; {if_missing}")
     except UnicodeDecodeError as error:
         faults.add(file, None, f"is not UTF-8 text (byte {error.start}); write it again as UTF-8")
     except OSError as error:

@@ -29,7 +29,7 @@ class Header:
 
 def read_header(file: Path, faults: Faults) -> Header | None:
     """Read `campaign.yaml`; None after noting every fault of it."""
-    text = read_text(file, faults)
+    text = read_text(file, faults, f"write format: {FORMAT}, excitation and sensors into it")
     if text is None:
         return None
     try:

@@ -40,7 +40,7 @@ def read_shots(
     coordinate: Coordinate = Coordinate.TRANSLATION,
 ) -> tuple[tuple[str, ...], list[ShotRow]] | None:
     """Columns and rows of `shots.csv`; None after noting every fault of it."""
-    text = read_text(file, faults)
+    text = read_text(file, faults, "write a row for each trace, under a header line with `shot`")
     if text is None:
         return None
     noted = len(faults)

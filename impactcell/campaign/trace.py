@@ -24,7 +24,7 @@ def read_trace(
         None after noting every fault of the file.
     """
     columns = {sensor: COLUMNS[coordinate][sensor] for sensor in CHANNELS}
-    text = read_text(file, faults)
+    text = read_text(file, faults, "take the shot out of shots.csv or record it again")
     if text is None:
         return None
     lines = text.splitlines()

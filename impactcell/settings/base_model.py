@@ -15,7 +15,8 @@ from impactcell.discrepancy.machine import CATALOGUE, LAW_PLACES, LawForm, Numbe
 from impactcell.discrepancy.machine import BaseModel as MachineModel
 from impactcell.errors import SettingsError
 from impactcell.process import yaml_loader
-from impactcell.settings.fields import NotNegative, Positive
+from impactcell.settings.fields import Positive
+from impactcell.settings.uncertain_numbers import Number, NumberOfEach, NumberOfRecords, UncertainNumber
 
 NUISANCES = ("position_offset", "position_eccentricity", "force_offset", "force_gain", "delay_s")
 """What a measurement may be off by, in the order in which it is written."""
@@ -28,27 +29,6 @@ ATOMS = {atom.name: atom for atom in ATOMS_IN_ORDER}
 
 class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class UncertainNumber(_Part):
-    """A number and how well it is known; `std: free` leaves it to the data."""
-
-    value: FiniteFloat = 0.0
-    std: NotNegative | Literal["free"]
-
-    def prior(self) -> NumberPrior:
-        """Return it as the workflow takes it."""
-        return NumberPrior(self.value, math.inf if self.std == "free" else self.std)
-
-
-class NumberOfRecords(UncertainNumber):
-    """A number that may be another one in each record."""
-
-    each: Literal["record"] | None = None
-
-
-Number = FiniteFloat | UncertainNumber
-"""A number that is exact, or `{value: ..., std: ...}`."""
 
 
 class TermOfColumn(_Part):
@@ -71,7 +51,7 @@ class Nuisances(_Part):
 
     position_offset: Number = 0.0
     position_eccentricity: Number = 0.0
-    force_offset: FiniteFloat | NumberOfRecords = 0.0
+    force_offset: NumberOfEach = 0.0
     force_gain: Number = 0.0
     delay_s: Number = 0.0
 

@@ -1,11 +1,17 @@
-"""What is said of records beside what is found in them: spikes, commands, clipping, sums."""
+"""What is said of records beside what is found in them: spikes, commands, clipping, sums, other masses."""
 
+import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from impactcell.campaign import COLUMNS
-from impactcell.discrepancy.machine.base_model import BaseModel
+from impactcell.discrepancy.machine.base_model import PRIOR_REACH, BaseModel
 from impactcell.discrepancy.machine.lost_stretches import MOST_CLIPPED
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
+
+INERTIA_SHARE = 0.01
+"""By how much a mass that two places state may differ: it was weighed to so much."""
 
 
 def notes_of_records(base: BaseModel, records: Sequence[UniformRecord]) -> list[str]:
@@ -31,7 +37,7 @@ def notes_of_records(base: BaseModel, records: Sequence[UniformRecord]) -> list[
             "speed that was filtered, or made from an encoder's counts, it is not: "
             f"state {key} in campaign.yaml, or record the position itself."
         )
-    return [*notes, *_notes_of_clipping(records)]
+    return [*notes, *_notes_of_clipping(records), *_notes_of_inertia(base, records)]
 
 
 def _notes_of_clipping(records: Sequence[UniformRecord]) -> list[str]:
@@ -49,3 +55,24 @@ def _notes_of_clipping(records: Sequence[UniformRecord]) -> list[str]:
             "its limit. If it is the recorder's range that ends there, choose a wider one."
         )
     return notes
+
+
+def _notes_of_inertia(base: BaseModel, records: Sequence[UniformRecord]) -> list[str]:
+    """Say that what shots.csv states of the inertia is another than the base model's, which goes for all."""
+    if not math.isfinite(base.inertia.value):
+        return []
+    stated, std = base.inertia.value, base.inertia.std
+    own = [record for record in records if math.isfinite(record.stated_inertia)]
+    if math.isinf(std) and own:
+        stated, std = float(np.median([record.stated_inertia for record in own])), 0.0
+    off = max(INERTIA_SHARE * stated, PRIOR_REACH * std)
+    others = [record for record in own if abs(record.stated_inertia - stated) > off]
+    if not others:
+        return []
+    key, first = COLUMNS[base.coordinate]["mass"], others[0]
+    note = (
+        f"The base model's {key} goes for all records; shots.csv states another one for {len(others)} of "
+        f"{len(records)} shots, first for shot {first.shot} ({first.stated_inertia:.6g}): leave {key} out of "
+        "the base model, and each has its own."
+    )
+    return [note]

@@ -62,6 +62,8 @@ class UniformRecord:
         Samples of a channel that are clipped, and so in a gap.
     at_limit : bool
         The force stands at an end of its range so often that it is its drive's own, and counts.
+    stated_inertia : float
+        Inertia or mass that `shots.csv` states, whichever is taken; nan where it does not.
     """
 
     shot: int
@@ -79,6 +81,7 @@ class UniformRecord:
     gaps: Gaps = ()
     clipped: int = 0
     at_limit: bool = False
+    stated_inertia: float = math.nan
     command: Samples | None = None
     summed_up: bool = False
 
@@ -171,6 +174,7 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         raise CampaignError(f"shot {shot.cycle}: has no position; a base model is about how the part moves")
     if driven and shot.force is None:
         raise CampaignError(f"shot {shot.cycle}: has no force where other shots have one")
+    _check_columns(shot, base)
     inertia = base.inertia.value if math.isfinite(base.inertia.value) else shot.mass_kg
     if not math.isfinite(inertia):
         raise CampaignError(f"shot {shot.cycle}: neither it nor the base model states an inertia or mass")
@@ -231,9 +235,27 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         gaps=gaps_of(channels, lost, base.delay_s, begin),
         clipped=sum(int(beyond.sum()) for beyond in clipped),
         at_limit=at_limit,
+        stated_inertia=shot.mass_kg,
         command=None if command is None else gain * command + base.force_offset.value,
         summed_up=shot.position.summed_up,
     )
+
+
+def _check_columns(shot: Capture, base: BaseModel) -> None:
+    """See that no term goes by a text.
+
+    Raises
+    ------
+    CampaignError
+        One does.
+    """
+    for choice in base.terms:
+        value = shot.covariates.get(choice.covariate)
+        if isinstance(value, str):
+            raise CampaignError(
+                f"shot {shot.cycle}: {choice.covariate!r} in shots.csv is {value!r}, and {choice.identifier} "
+                "goes by its numbers; write a number in each row, or leave the term out of the base model"
+            )
 
 
 def _position_noise(position: Channel, clean: Samples) -> tuple[float, bool]:

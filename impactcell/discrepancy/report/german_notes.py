@@ -154,6 +154,10 @@ NOTES: Final[Patterns] = (
      (r"In \1 von \2 Messungen steht die Kraft mehr als \3 % der Zeit an einem Ende ihres Bereichs: Sie gilt "
       r"als das, was antreibt, wie bei einem Regler an seiner Grenze. Endet dort der Messbereich, einen "
       r"weiteren wählen.")),
+    (r"The base model's (\w+) goes for all records; .* for (\d+) of (\d+) shots, .* (\d+) \((\S+)\): .*",
+     lambda m: f"{m[1]} des Grundmodells gilt für alle Messungen; shots.csv gibt für {m[2]} von {m[3]} "
+     f"etwas anderes an, zuerst für Messung {m[4]} ({m[5].replace('.', ',')}): {m[1]} im Grundmodell "
+     "weglassen, dann hat jede ihren eigenen Wert."),
     (r"(\d+) of (\d+) samples stood far from their neighbours and were replaced\.",
      r"\1 von \2 Messwerten lagen weit von ihren Nachbarn und wurden ersetzt."),
     (r"Shot (\d+): what lies before (\S+) s is left out, since the swing grows until then: .*",

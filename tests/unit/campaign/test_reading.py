@@ -155,7 +155,11 @@ def test_faults_of_the_header(tmp_path: Path, header: str, line: int | None, mes
         ("shot,velocity_mm_per_min,dwell_s\n1,3000,nan\n2,3000,1\n", 2, "dwell_s is 'nan'"),
         ("shot,velocity_mm_per_min\n1,3000,7\n2,3000\n", 2, "3 cells where the header has 2"),
         ('shot,velocity_mm_per_min\n1,"3000\n', 2, "is not CSV"),
-        ("shot,velocity_mm_per_min\n1,3000\n2,3000\n3,3000\n", None, "3.csv: is missing"),
+        (
+            "shot,velocity_mm_per_min\n1,3000\n2,3000\n3,3000\n",
+            None,
+            "3.csv: is missing; take the shot out of shots.csv or record it again",
+        ),
         ("shot,velocity_mm_per_min\n1,3000\n", None, "2.csv: has no shot 2 in shots.csv"),
     ],
 )
