@@ -147,6 +147,23 @@ def test_a_stribeck_speed_is_found_between_the_points_of_its_grid() -> None:
     assert investigate_machine(records, knows).verdict == "no_gap"
 
 
+@pytest.mark.parametrize(("rise_n", "speed"), [(1.0, 0.02), (0.75, 0.025)])
+def test_a_stribeck_speed_moves_on_from_where_it_was_first_found(rise_n: float, speed: float) -> None:
+    """Rows that tell it weigh little beside what the base model leaves, and more beside what it leaves."""
+
+    def friction(_place: Samples, now: Samples) -> Samples:
+        return COULOMB_N + rise_n * np.exp(-((now / speed) ** 2))
+
+    noise, knows = (1e-3, 1e-6), replace(SLIDE, terms=(*SLIDE.terms, TermChoice("stribeck_friction")))
+    records = slides(lambda rng: sines(4.0, rng), noise, friction, rate_hz=500.0, count=6, duration_s=8.0)
+    for base, established in ((SLIDE, ("stribeck_friction",)), (knows, ())):
+        finding = investigate_machine(records, base)
+        assert finding.established == established
+        assert finding.is_at_floor
+        assert finding_shape(finding, "stribeck_friction") == pytest.approx(speed, rel=3e-3)
+        assert value_of(finding, "stribeck_friction") == pytest.approx(rise_n, rel=5e-3)
+
+
 @pytest.mark.parametrize("half", [3, 5, 14, 50])
 def test_a_kink_shifts_a_smoothed_speed_by_the_share_that_is_said(half: int) -> None:
     """At a kink on a sample; over more samples the shift comes near 5/64, over fewer it is larger."""

@@ -1,5 +1,6 @@
 """What is established: terms selected on training blocks, and proved on held-out ones."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import takewhile
@@ -27,7 +28,11 @@ from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch
 from impactcell.discrepancy.machine.weak_form import Column
 
 WEIGHINGS = 2
-"""Rounds of weights by what a model leaves, and of a model by these weights [1]."""
+"""Rounds of weights by what a model leaves, and of a model by these weights, at least [1]."""
+MOST_WEIGHINGS = 12
+"""And at most, as long as shapes move: the farther off, the less weigh the rows that tell them [1]."""
+SETTLED = 1e-3
+"""Relative move of a shape from one round to the next up to which it has settled [1]."""
 
 
 def establish(
@@ -42,9 +47,11 @@ def establish(
     proved once more with weights by its own remainder, so that gaps before and after have the same ones.
     """
     base_terms = tuple(ChosenTerm(choice, fits.shapes[choice.name][0]) for choice in fits.base.terms)
-    for _ in range(WEIGHINGS):
-        base_terms = fits.with_best_shapes(base_terms)
+    for turn in range(1, MOST_WEIGHINGS + 1):
+        before, base_terms = base_terms, fits.with_best_shapes(base_terms)
         fits.weigh(fits.fit(base_terms, settle=True))
+        if turn >= WEIGHINGS and _is_settled(before, base_terms):
+            break
     training, held_out = fits.blocks()
     steps: list[SelectionStep] = []
     candidates: list[TermChoice] = []
@@ -67,11 +74,14 @@ def establish(
     proposed = [step.accepted.term for step in steps if step.accepted is not None]
     proven = [*takewhile(lambda term: term.choice.name not in contradicted, proposed)]
     models, falls = _prove(fits, base_terms, proven, seed)
-    for _ in range(WEIGHINGS if falls else 0):
+    for turn in range(1, MOST_WEIGHINGS + 1 if falls else 0):
+        before = models[-1].terms
         fits.weigh(models[-1])
         models, falls = _prove(
             fits, base_terms, [term for term in proposed if term.choice.name in falls], seed
         )
+        if turn >= WEIGHINGS and _is_settled(before, models[-1].terms):
+            break
     training, held_out = fits.blocks()
     if falls:
         steps = _with_ties_of_now(_search(fits, training, candidates), fits.columns(base_terms), steps)
@@ -122,9 +132,7 @@ def _prove(
     fits: MachineFits, base_terms: tuple[ChosenTerm, ...], proposed: Sequence[ChosenTerm], seed: int
 ) -> tuple[list[FittedModel], dict[str, FallOfGap]]:
     """Models with no, one and two of the terms proposed, as far as the held-out gap falls with each."""
-    terms = (*base_terms, *proposed)
-    for place in range(len(base_terms), len(terms)):
-        terms = fits.with_shape_refined(terms, place)
+    terms = fits.with_best_shapes((*base_terms, *proposed), len(base_terms))
     _, held_out = fits.blocks()
     models, falls = [fits.fit(base_terms, settle=False)], dict[str, FallOfGap]()
     for count in range(len(base_terms) + 1, len(terms) + 1):
@@ -135,6 +143,13 @@ def _prove(
         models.append(after)
         falls[terms[count - 1].choice.name] = fall
     return models, falls
+
+
+def _is_settled(before: Sequence[ChosenTerm], now: Sequence[ChosenTerm]) -> bool:
+    """Whether the shapes of a model's terms move no more."""
+    return len(before) == len(now) and all(
+        math.isclose(one.shape, other.shape, rel_tol=SETTLED) for one, other in zip(before, now, strict=True)
+    )
 
 
 def _with_ties_of_now(

@@ -82,9 +82,10 @@ class MachineFits:
         self.doubt = DirectionDoubt()
         self._rows = lru_cache(maxsize=4)(self._build)
         self._prepared = lru_cache(maxsize=4)(self.prepared)
-        self.shapes = {
+        self.grids = {
             choice.name: shape_grid(term_of(choice), self.scale) for choice in (*base.terms, *self.candidates)
         }
+        self.shapes = dict(self.grids)
 
     def with_freed(self, number: HeldNumber) -> Self:
         """Leave free a number that the base model holds."""
@@ -222,32 +223,28 @@ class MachineFits:
         self.gravity, self.delay_s = built_at
         self.priors = nuisance_priors(self.base, self.gravity)
 
-    def with_best_shapes(self, terms: tuple[ChosenTerm, ...]) -> tuple[ChosenTerm, ...]:
-        """Give each term the shape of least squares, on its grid and between, one after the other."""
-        for place, term in enumerate(terms):
-            shape = self._best_shape(terms, place, self.shapes[term.choice.name])
-            terms = (*terms[:place], ChosenTerm(term.choice, shape), *terms[place + 1 :])
-            terms = self.with_shape_refined(terms, place)
-        return terms
+    def with_best_shapes(self, terms: tuple[ChosenTerm, ...], first: int = 0) -> tuple[ChosenTerm, ...]:
+        """Give each term from the `first` on the shape of least squares, on its grid and between.
 
-    def with_shape_refined(self, terms: tuple[ChosenTerm, ...], place: int) -> tuple[ChosenTerm, ...]:
-        """Give one of the terms the shape of least squares between the neighbours of its own on the grid."""
-        choice, shape = terms[place].choice, terms[place].shape
-        grid = self.shapes[choice.name]
-        if len(grid) == 1:
-            return terms
-        finer = grid
-        for _ in range(REFINEMENTS):
-            finer = finer_grid(finer, shape)
-            shape = self._best_shape(terms, place, finer)
-        self.shapes[choice.name] = tuple(sorted({*grid, shape}))
-        self._rows.cache_clear()
-        return (*terms[:place], ChosenTerm(choice, shape), *terms[place + 1 :])
+        One after the other, and from the whole grid whatever was found before: beside other terms and other
+        weights of the rows it is another one.
+        """
+        for place in range(first, len(terms)):
+            choice = terms[place].choice
+            finer = grid = self.grids[choice.name]
+            if len(grid) == 1:
+                continue
+            shape = self._best_shape(terms, place, grid)
+            for _ in range(REFINEMENTS):
+                finer = finer_grid(finer, shape)
+                shape = self._best_shape(terms, place, finer)
+            self.shapes[choice.name] = tuple(sorted({*grid, shape}))
+            self._rows.cache_clear()
+            terms = (*terms[:place], ChosenTerm(choice, shape), *terms[place + 1 :])
+        return terms
 
     def _best_shape(self, terms: tuple[ChosenTerm, ...], place: int, grid: Sequence[float]) -> float:
         """Value of the shape of one of the terms that leaves least of the training blocks."""
-        if len(grid) == 1:
-            return grid[0]
         shapes = {term.choice: (term.shape,) for term in terms} | {terms[place].choice: tuple(grid)}
         rows = build_rows(self.records, self.base, shapes, (self.gravity, self.delay_s))
         training, _ = self.blocks(self.prepared(rows))
