@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import (
@@ -100,6 +101,49 @@ def test_a_spring_and_gravity_are_tied_in_small_angles_and_told_in_wide_ones() -
     assert strength(wide, "restoring_force") == pytest.approx(STIFFNESS, rel=1e-3)
 
 
+def swings_of(spring: float, amplitudes: Sequence[float]) -> Campaign:
+    """Free swings of a pendulum with a linear spring, one a record."""
+    time, shots = np.arange(0.0, 12.0, 2e-3), []
+    for number, amplitude in enumerate(amplitudes, 1):
+
+        def rates(_t: float, state: np.ndarray) -> tuple[float, float]:
+            angle, speed = state
+            held = GRAVITY * math.sin(angle) + spring * angle + 0.002 * math.tanh(speed / 1e-3)
+            return speed, -held / INERTIA
+
+        run = solve_ivp(rates, (0.0, 12.0), (amplitude, 0.0), "LSODA", time, rtol=1e-8, atol=1e-9)
+        read = run.y[0] + np.random.default_rng([8, number]).normal(0.0, 1e-4, time.size)
+        shots.append(Capture(number, math.nan, math.nan, None, Channel(time, read, None)))
+    return pendulum(tuple(shots))
+
+
+@pytest.mark.parametrize(
+    ("spring", "amplitudes", "established", "tied"),
+    [
+        (0.03, (1.2, 0.9, 1.3, 0.8, 1.1), ("restoring_force",), ("hardening_spring",)),
+        (0.03, (2.6, 1.5, 2.0, 1.0, 2.3), ("restoring_force",), ()),
+        (0.0, (1.2, 0.9, 1.3, 0.8, 1.1), (), ()),
+    ],
+)
+def test_a_spring_beside_gravity_that_is_free_is_no_harder_one(
+    spring: float, amplitudes: tuple[float, ...], established: tuple[str, ...], tied: tuple[str, ...]
+) -> None:
+    """Gravity takes of k q what is like a sine of it, and what is left looks like a cube."""
+    base = BaseModel(
+        coordinate=Coordinate.ROTATION,
+        inertia=NumberPrior(INERTIA),
+        gravity_torque=NumberPrior(0.9 * GRAVITY, math.inf),
+    )
+    finding = investigate_machine(swings_of(spring, amplitudes), base)
+    assert finding.established == established
+    assert finding.tied_with.get("restoring_force", ()) == tied
+    assert finding.is_at_floor
+    found = finding.final.value(("restoring_force", 0.0, 0))
+    assert found == pytest.approx(spring, rel=0.02)
+    gravity = 0.9 * GRAVITY + finding.final.nuisance("gravity_torque")
+    assert gravity == pytest.approx(GRAVITY, rel=2e-3)
+
+
 def test_gravity_that_a_base_model_forgot_is_no_spring() -> None:
     base = BaseModel(coordinate=Coordinate.ROTATION, inertia=NumberPrior(INERTIA))
     finding = investigate_machine(pendulum(swings(0.0)), base)
@@ -135,8 +179,13 @@ def test_a_position_that_counts_from_afar_is_a_constant_force_only_where_none_is
         (oscillates(Coordinate.TRANSLATION), True, ["inertia", "drive", "a constant force"]),
         (BaseModel(gravity_torque=NumberPrior(0.5)), False,
          ["inertia", "gravity", "drive", "a constant force"]),
+        (BaseModel(gravity_torque=NumberPrior(0.5, 0.1)), False,
+         ["inertia", "gravity", "drive", "a constant force"]),
+        (BaseModel(gravity_torque=NumberPrior(0.5, math.inf)), False, ["drive", "a constant force"]),
         (BaseModel(gravity_torque=NumberPrior(0.0, math.inf), force_offset_by_record=True), True,
-         ["inertia", "gravity", "drive"]),
+         ["inertia", "drive"]),
+        (BaseModel(inertia=NumberPrior(2.0, math.inf)), True, ["drive", "a constant force"]),
+        (BaseModel(force_gain=NumberPrior(0.0, math.inf)), True, ["inertia", "a constant force"]),
     ],
 )  # fmt: skip
 def test_a_term_is_held_against_what_a_machine_has(

@@ -24,15 +24,17 @@ ONE_WAY = 0.95
 def machine_parts(base: BaseModel, *, is_driven: bool) -> dict[str, Column]:
     """Columns of what a machine has anyway, by name: what is wrong there would be named by a term like it.
 
-    No gravity is wrong that a base model does not have. Where nothing drives either, the inertia is the unit
-    of every force. A constant force that is free is fitted.
+    No gravity is wrong that a base model does not have. What is free is fitted beside every term. Where
+    nothing drives and no gravity is held either, the inertia is the unit of every force.
     """
+    holds_gravity = base.has_gravity and not math.isinf(base.gravity_torque.std)
     parts: dict[str, Column] = {}
-    if is_driven or base.has_gravity:
+    if (is_driven or holds_gravity) and not math.isinf(base.inertia.std):
         parts["inertia"] = ("inertia", 0.0, 0)
-    if base.has_gravity:
+    if holds_gravity:
         parts["gravity"] = ("gravity_torque", 0.0, 0)
-    parts["drive"] = ("force_gain", 0.0, 0)
+    if not math.isinf(base.force_gain.std):
+        parts["drive"] = ("force_gain", 0.0, 0)
     if not base.has_free_offset:
         parts["a constant force"] = OFFSET
     return parts
@@ -53,17 +55,20 @@ def like_the_machine(blocks: Blocks, term: ChosenTerm, parts: Iterable[Column], 
     own, left = blocks.places(parts), np.diag(total)[places]
     size = np.outer(np.diag(total)[own], left) + np.finfo(float).tiny
     alike = total[np.ix_(own, places)] ** 2 / size
-    return bool(np.all((alike.max(axis=0) >= MAX_ALIKE) | (left < RIDGE * whole)))
+    return bool(np.all((alike.max(axis=0, initial=0.0) >= MAX_ALIKE) | (left < RIDGE * whole)))
 
 
 def alike_note(
     candidates: Sequence[TermChoice], kept: Sequence[TermChoice], parts: Mapping[str, Column]
 ) -> list[str]:
-    """Say which terms are not looked for."""
+    """Say which terms are not looked for.
+
+    Where no part is held, a term is left out that is as good as constant beside a constant force.
+    """
     names = [in_words(choice.name) for choice in candidates if choice not in kept]
     if not names:
         return []
-    like = enumerated([*parts], "or")
+    like = enumerated([*parts] or ["a constant force"], "or")
     return [f"{', '.join(names)}: on these records like {like}, and so not looked for."]
 
 
