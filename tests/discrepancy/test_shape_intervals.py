@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import fractional_matrix_power
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
@@ -17,9 +18,10 @@ from impactcell.discrepancy.machine import (
     TermChoice,
 )
 from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.regression import blocks_of, fit_blocks
 from impactcell.discrepancy.machine.shape_intervals import with_shape_intervals
 from impactcell.discrepancy.machine.uniform_records import uniform_records
-from impactcell.discrepancy.machine.weak_form import build_rows
+from impactcell.discrepancy.machine.weak_form import Rows, build_rows
 from impactcell.records import Capture, Channel, Samples
 from tests.discrepancy.stick_slip import sines
 
@@ -65,6 +67,25 @@ def slides() -> Campaign:
     return Campaign(Excitation.DRIVEN, tuple(shots))
 
 
+def half_by_rows(matrix: Samples, left: Samples, blocks: list[np.ndarray]) -> Samples:
+    """Half intervals by CR2 and its degrees of freedom, by the hat matrix of all rows."""
+    inverse = np.linalg.inv(matrix.T @ matrix)
+    passed = np.eye(len(matrix)) - matrix @ inverse @ matrix.T
+    parts, spreads = [], []
+    for block in blocks:
+        adjusted = np.real(fractional_matrix_power(passed[np.ix_(block, block)], -0.5))
+        weights = inverse @ matrix[block].T @ adjusted
+        parts.append(weights @ left[block])
+        spreads.append(weights @ passed[block])
+    variance = np.square(parts).sum(axis=0)
+    half = []
+    for number, size in enumerate(variance):
+        each = np.array([spread[number] for spread in spreads])
+        values = np.linalg.eigvalsh(each @ each.T)
+        half.append(student.ppf(0.975, values.sum() ** 2 / np.sum(values**2)) * math.sqrt(size))
+    return np.array(half)
+
+
 @pytest.fixture(scope="module")
 def fits() -> MachineFits:
     return MachineFits(uniform_records(slides(), BASE), BASE, [], None)
@@ -102,17 +123,29 @@ def test_intervals_are_those_of_nonlinear_least_squares_with_the_scatter_between
         jac="3-point",
     )
     jacobian, left = found.jac, found.fun
-    scores = np.stack(
-        [jacobian[number[inside] == one].T @ left[number[inside] == one] for one in training.number]
-    )
-    inverse = np.linalg.inv(jacobian.T @ jacobian)
-    freedom = len(training) - len(found.x)
-    spread = inverse @ scores.T @ scores @ inverse * len(training) / freedom
-    half = student.ppf(0.975, freedom) * np.sqrt(np.diag(spread))
+    half = half_by_rows(jacobian, left, [number[inside] == one for one in training.number])
     low, high = told.shape_intervals[RIPPLE.name]
     assert 0.5 * (told.fit.high - told.fit.low) == pytest.approx(half[:-1], rel=0.02)
     assert 0.5 * math.log(high / low) == pytest.approx(half[-1], rel=0.02)
     assert low < PERIOD_M < high
+
+
+@pytest.mark.parametrize("tells", [6, 60])
+def test_intervals_hold_the_truth_where_few_blocks_tell(tells: int) -> None:
+    """By the plain sandwich, and as many degrees of freedom as blocks, 74 and 94 % of them did."""
+    rng, held = np.random.default_rng(5), []
+    place = np.repeat(np.arange(60), 4)
+    reach = np.where(place < tells, rng.exponential(1.0, 60)[place], 0.0)
+    columns = {("one", 0.0, 0): np.ones(240), ("slope", 0.0, 0): reach * rng.normal(size=240)}
+    matrix = np.stack([*columns.values()], axis=1)
+    for _ in range(1000):
+        left = np.repeat(rng.normal(size=60), 4) * reach.clip(0.1) + rng.normal(size=240)
+        target = matrix @ np.array([1.0, 2.0]) + left
+        rows = Rows(target, columns, np.zeros(240), np.arange(240.0), np.ones(240), np.zeros(240))
+        blocks = blocks_of(rows, place, dict.fromkeys(range(60), 0))
+        fit = fit_blocks(blocks, [*columns], {}, frozenset())
+        held.append((fit.low[1] < 2.0) & (fit.high[1] > 2.0))
+    assert 0.93 <= np.mean(held) <= 0.985
 
 
 def test_a_shape_that_says_nothing_is_open(fits: MachineFits, model: FittedModel) -> None:

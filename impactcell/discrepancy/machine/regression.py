@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.stats import t as student
 
 from impactcell.discrepancy.machine.base_model import PRIOR_REACH, NumberPrior
+from impactcell.discrepancy.machine.block_scatter import half_intervals
 from impactcell.discrepancy.machine.weak_form import Column, IndexArray, Rows
 from impactcell.records import Samples
 
@@ -131,21 +131,16 @@ def fit_blocks(
     priors: Mapping[Column, NumberPrior],
     nonnegative: frozenset[Column],
 ) -> LinearFit:
-    """Fit a model to blocks, with 95 % intervals by the scatter between them (sandwich over blocks)."""
+    """Fit a model to blocks, with 95 % intervals by the scatter between them."""
     whole = blocks.products.sum(axis=0)
     coefficients, at_bound = _solve(blocks, (whole, len(blocks)), columns, priors, nonnegative)
     places = blocks.places(columns)
     last = len(blocks.names)
-    scores = blocks.products[:, places, last] - np.einsum(
-        "bij,j->bi", blocks.products[np.ix_(range(len(blocks)), places, places)], coefficients
-    )
+    grams = blocks.products[np.ix_(range(len(blocks)), places, places)]
+    scores = blocks.products[:, places, last] - grams @ coefficients
     matrix = whole[np.ix_(places, places)] + np.diag(prior_weight(blocks, columns, coefficients, priors))
     matrix += RIDGE * np.diag(np.diag(matrix))
-    size = _sizes(matrix)
-    inverse = np.linalg.pinv(matrix / np.outer(size, size), hermitian=True) / np.outer(size, size)
-    freedom = max(len(blocks) - len(columns), 1)
-    spread = inverse @ (scores.T @ scores) @ inverse * len(blocks) / freedom
-    half = student.ppf(0.975, freedom) * np.sqrt(np.maximum(np.diag(spread), 0.0))
+    half = half_intervals(grams, scores, matrix)
     low = lower_ends(columns, coefficients - half, nonnegative)
     return LinearFit(tuple(columns), coefficients, low, coefficients + half, at_bound)
 
