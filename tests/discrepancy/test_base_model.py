@@ -22,7 +22,6 @@ from impactcell.discrepancy.machine import (
     Response,
     TermChoice,
     investigate_machine,
-    investigation,
     simulate_held_out,
 )
 from impactcell.discrepancy.machine.uniform_records import uniform_records
@@ -183,7 +182,7 @@ def test_what_the_simulation_contradicts_is_not_named(monkeypatch: pytest.Monkey
         added = any(term.choice.name == name for term in model.terms)
         return replace(error, rmse=rise[-1] if added else 1.0)
 
-    monkeypatch.setattr(investigation, "simulate_held_out", erring)
+    monkeypatch.setattr("impactcell.discrepancy.machine.simulation.simulate_held_out", erring)
     assert investigate_machine(seal(0.8), SEAL).established == (name,)
     rise.append(1.2)
     finding = investigate_machine(seal(0.8), SEAL)

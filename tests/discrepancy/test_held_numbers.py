@@ -59,6 +59,13 @@ ONE_SCALE = tuple(
     if number.name == "force_gain"
 )
 """Gains of a force that are a mass, or an inertia, as well."""
+OF_NONE = tuple(
+    number
+    for coordinate in Coordinate
+    for number in held_numbers(BaseModel(coordinate, Response.FORCE, NumberPrior()), 1e-3)
+    if number.name == "inertia"
+)
+"""Mass and inertia where none was taken."""
 GAIN_OR_MASS = (
     r" gain of the force (\S+) % (larger|smaller), or a mass (\S+) % (larger|smaller) "
     r"\(these records do not tell which\) would explain (\d+) %"
@@ -214,8 +221,8 @@ def test_a_translation_has_no_angle_and_a_free_motion_no_inertia_to_tell() -> No
     assert "inertia" not in [number.name for number in held_numbers(PENDULUM, 1e-3)]
     pushed = BaseModel(inertia=NumberPrior(2.0, math.inf))
     assert [number.name for number in held_numbers(pushed, 1e-3)] == ["delay_s", "force_offset"]
-    massless = replace(slides, inertia=NumberPrior(0.0))
-    assert "inertia" not in [number.name for number in held_numbers(massless, 1e-3)]
+    by_shot = replace(slides, inertia=NumberPrior(math.nan))
+    assert "inertia" not in [number.name for number in held_numbers(by_shot, 1e-3)]
 
 
 @pytest.mark.parametrize(
@@ -245,7 +252,9 @@ def test_a_torque_of_gravity_is_off_by_half_of_what_is_stated_at_most(stated: fl
     assert gravity.farthest == pytest.approx(farthest)
 
 
-@pytest.mark.parametrize("number", [*held_numbers(EVERY, 1e-3), *ONE_SCALE], ids=lambda number: number.name)
+@pytest.mark.parametrize(
+    "number", [*held_numbers(EVERY, 1e-3), *ONE_SCALE, *OF_NONE], ids=lambda number: number.name
+)
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_each_is_said_in_german(number: HeldNumber, sign: float) -> None:
     (english,) = held_number_notes([Explained(number, (sign * 0.004, 0.003)[: len(number.columns)], 0.6)])

@@ -13,7 +13,7 @@ from impactcell.discrepancy.machine.explained_by_numbers import (
     held_number_notes,
 )
 from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
-from impactcell.discrepancy.machine.held_numbers import held_numbers, sampling_step_s, told_from_number
+from impactcell.discrepancy.machine.held_numbers import numbers_held, told_from_number
 from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine, machine_parts
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
@@ -56,7 +56,7 @@ def establish(
     steps: list[SelectionStep] = []
     candidates: list[TermChoice] = []
     enough = MachineFinding.enough(training, held_out)
-    numbers = held_numbers(fits.base, sampling_step_s(fits.records))
+    numbers = numbers_held(fits.base, fits.records, fits.scale)
     if enough:
         parts = machine_parts(fits.base, is_driven=any(record.force.any() for record in fits.records))
         candidates = [

@@ -1,10 +1,10 @@
 """What numbers that a base model holds would explain of what a model leaves, and how that is told."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from impactcell.discrepancy.machine.held_numbers import HeldNumber, fitted, hold
+from impactcell.discrepancy.machine.held_number import HeldNumber
+from impactcell.discrepancy.machine.held_numbers import fitted, hold
 from impactcell.discrepancy.machine.selection import MIN_SHARE, SelectionStep
 from impactcell.discrepancy.machine.ties import MIN_TIED_SHARE
 from impactcell.discrepancy.machine.trials import TermSearch
@@ -40,7 +40,7 @@ def explained_by(search: TermSearch, columns: Sequence[Column], number: HeldNumb
     if not (hold(search, gains, before) and gains.sum() >= MIN_SHARE * excess > 0.0):
         return None
     coefficients = fitted(search.blocks, columns, number, search.priors, search.nonnegative)
-    if math.hypot(*coefficients) > number.farthest:
+    if not number.is_possible(coefficients):
         return None
     return Explained(number, coefficients, min(float(gains.sum()) / excess, 1.0))
 

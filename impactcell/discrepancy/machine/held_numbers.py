@@ -6,12 +6,13 @@ named, and against a law that nobody had listed.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
+from impactcell.discrepancy.machine.held_number import DELAY, HeldNumber
 from impactcell.discrepancy.machine.held_number_words import (
     larger_or_smaller,
     late_or_early,
@@ -19,114 +20,45 @@ from impactcell.discrepancy.machine.held_number_words import (
     off_its_centre,
     two_digits,
 )
+from impactcell.discrepancy.machine.motion_scale import MotionScale
 from impactcell.discrepancy.machine.regression import Blocks, fit_blocks
 from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, SelectionStep
 from impactcell.discrepancy.machine.ties import MIN_TIED_SHARE, TIE_Z, tied_terms
 from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch, Trial, mean_over_error
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
-from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, Column
+from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, INERTIA_BESIDE, Column
 from impactcell.records import Samples
 
-DELAY: Column = ("delay_s", 0.0, 0)
-"""Column of how late the force was recorded: the force's derivative."""
 NEARLY_ALL = 0.9
 """Share of what remains from which on a force recorded late or early, by however much, is no law."""
 FARTHEST_OFF_RAD = 0.05
 """Error of an angle, three degrees, beyond which no encoder that anybody uses turns off its centre."""
-FARTHEST_ANGLE_RAD = 0.5
-"""Error of an angle beyond which a wave of it is not small."""
+FARTHEST_ZERO_RAD = 0.5
+"""Error of the zero of an angle beyond which it makes no constant."""
+FARTHEST_DELAY_PERIODS = 0.25
+"""Delay in periods of the motion beyond which it is not the force's derivative that it adds."""
 FARTHEST_SHARE = 0.5
 """Share of a mass, a gain or a torque of gravity by which one who states it may be wrong."""
 INERTIA: Final = {
-    Coordinate.TRANSLATION: ("a", "mass", "mass_kg"),
-    Coordinate.ROTATION: ("an", "inertia", "inertia_kg_m2"),
+    Coordinate.TRANSLATION: ("a mass", "mass_kg", "kg"),
+    Coordinate.ROTATION: ("an inertia", "inertia_kg_m2", "kg m²"),
 }
-"""What is inert, and its key in a base model."""
+"""What is inert, its key in a base model and its unit."""
 MIN_SHARE_BESIDE = 0.5
 """Share of what a term closes by itself that it closes beside a number too, where both are missing [1]."""
 
 
-@dataclass(frozen=True, slots=True)
-class HeldNumber:
-    """A number that a base model holds, and how one would speak of it if it were off.
-
-    Attributes
-    ----------
-    name : str
-        Attribute of the base model.
-    columns : tuple of Column
-    phrase : str
-        What would be off.
-    sized : callable
-        The same with its size, from its coefficients.
-    key : str
-        Where the base model would leave it free.
-    largest : float
-        Error of a sensor up to which nobody can exclude it who has not stated it [s or rad]: nothing is named
-        that it explains as well. 0 of a number that is none of a sensor.
-    farthest : float
-        Error beyond which it explains nothing, in the unit of its coefficients: a gain of nought would take
-        all force out of a model.
-    is_absent : bool
-        The base model has none of it: a term that it explains as well is tied with it.
-    other_key : str
-        Where the base model would leave free what records do not tell from it; empty where there is nothing.
-    """
-
-    name: str
-    columns: tuple[Column, ...]
-    phrase: str
-    sized: Callable[[Sequence[float]], str]
-    key: str
-    largest: float = 0.0
-    farthest: float = math.inf
-    is_absent: bool = False
-    other_key: str = ""
-
-    @property
-    def keys(self) -> str:
-        """Where the base model would leave it free, or what is not told from it."""
-        return f"{self.key} or {self.other_key}" if self.other_key else self.key
-
-    @property
-    def is_delay(self) -> bool:
-        """Whether it is how late the force was recorded, which is looked for within a prior only."""
-        return self.columns == (DELAY,)
-
-    @property
-    def as_well(self) -> str:
-        """Why a term is not taken that explains no more."""
-        least = " by less than a sample" if self.is_delay else ""
-        return f"{self.phrase}{least} would explain as much as the best term"
-
-    @property
-    def better(self) -> str:
-        """Why a term is not taken that explains less."""
-        return f"{self.phrase} would explain more than the best term"
-
-    @property
-    def as_a_law(self) -> str:
-        """Why no law is proposed that explains no more."""
-        return (
-            f"{self.phrase} does as well as any function of speed, load or position; {self.keys} would tell"
-        )
-
-    @property
-    def beside_a_law(self) -> str:
-        """What is told of a law that was found with this number left free."""
-        return (
-            f"A{self.phrase[1:]} explains nearly all that any function of speed, load or position would; "
-            f"the law is of what is left beside it, and has {self.key}."
-        )
-
-    def freed(self, base: BaseModel) -> BaseModel:
-        """Leave the number free."""
-        prior: NumberPrior = getattr(base, self.name)
-        changed: BaseModel = replace(base, **{self.name: replace(prior, std=math.inf)})  # type: ignore[arg-type]
-        return changed
+def numbers_held(
+    base: BaseModel, records: Sequence[UniformRecord], scale: MotionScale
+) -> tuple[HeldNumber, ...]:
+    """List the numbers that a base model holds and that its records could tell."""
+    is_driven = any(record.force.any() for record in records)
+    return held_numbers(base, sampling_step_s(records), period_s=scale.period_s, is_driven=is_driven)
 
 
-def held_numbers(base: BaseModel, sample_s: float) -> tuple[HeldNumber, ...]:
+def held_numbers(
+    base: BaseModel, sample_s: float, *, period_s: float = math.inf, is_driven: bool = True
+) -> tuple[HeldNumber, ...]:
     """List the numbers that a base model holds and that records could tell.
 
     Parameters
@@ -134,6 +66,10 @@ def held_numbers(base: BaseModel, sample_s: float) -> tuple[HeldNumber, ...]:
     base : BaseModel
     sample_s : float
         Between two samples: a delay of less is nobody's to exclude [s].
+    period_s : float
+        Of the motion.
+    is_driven : bool
+        Whether a force acts: else only forces over the inertia show.
     """
     turns = base.coordinate is Coordinate.ROTATION
     unit = "N m" if turns else "N"
@@ -141,7 +77,7 @@ def held_numbers(base: BaseModel, sample_s: float) -> tuple[HeldNumber, ...]:
         HeldNumber(
             "delay_s", (DELAY,), "a force recorded late or early", late_or_early,
             _nuisance("delay_s: {std: SECONDS}"),
-            sample_s,
+            sample_s, FARTHEST_DELAY_PERIODS * period_s,
         ),
         HeldNumber(
             "force_offset", (_column("force_offset"),), "a constant force",
@@ -155,12 +91,12 @@ def held_numbers(base: BaseModel, sample_s: float) -> tuple[HeldNumber, ...]:
             HeldNumber(
                 "position_eccentricity", tuple((ECCENTRICITY, 0.0, number) for number in range(2)),
                 "an encoder that turns off its centre", off_its_centre, _nuisance("position_eccentricity"),
-                FARTHEST_OFF_RAD, FARTHEST_ANGLE_RAD,
+                FARTHEST_OFF_RAD, FARTHEST_OFF_RAD,
             ),
             HeldNumber(
                 "position_offset", (_column("position_offset"),), "a zero of the angle that is off",
                 lambda size: f"a zero of the angle {two_digits(1e3 * abs(size[0]))} mrad off",
-                _nuisance("position_offset"), FARTHEST_OFF_RAD, FARTHEST_ANGLE_RAD,
+                _nuisance("position_offset"), FARTHEST_OFF_RAD, FARTHEST_ZERO_RAD,
             ),
             HeldNumber(
                 "gravity_torque", (_column("gravity_torque"),), "another torque of gravity",
@@ -170,16 +106,31 @@ def held_numbers(base: BaseModel, sample_s: float) -> tuple[HeldNumber, ...]:
                 is_absent=not base.has_gravity,
             ),
         ]  # fmt: skip
-    if base.response is Response.FORCE and base.inertia.value > 0.0 and not _is_one_scale(base):
-        article, word, key = INERTIA[base.coordinate]
-        numbers.append(
-            HeldNumber(
-                "inertia", (_column("inertia"),), f"another {word}",
-                lambda size: f"{article} {word} {larger_or_smaller(size[0])}",
-                f"a free {key} in the base model", farthest=FARTHEST_SHARE,
-            )
-        )  # fmt: skip
+    if base.inertia.value > 0.0 and is_driven and not _is_one_scale(base):
+        numbers.append(_inertia(base))
+    if base.inertia.value == 0.0:
+        numbers.append(_inertia_of_none(base))
     return tuple(one for one in numbers if _is_held(base, one.name))
+
+
+def _inertia(base: BaseModel) -> HeldNumber:
+    """Inertia by the share that it is off, beside forces of known size."""
+    what, key, _ = INERTIA[base.coordinate]
+    return HeldNumber(
+        "inertia", (_column("inertia"),), f"another {what.split()[1]}",
+        lambda size: f"{what} {larger_or_smaller(size[0])}",
+        f"a free {key} in the base model", farthest=FARTHEST_SHARE,
+    )  # fmt: skip
+
+
+def _inertia_of_none(base: BaseModel) -> HeldNumber:
+    """Inertia by its size, where the base model has none."""
+    what, key, unit = INERTIA[base.coordinate]
+    return HeldNumber(
+        "inertia", (INERTIA_BESIDE,), what,
+        lambda size: f"{what} of {two_digits(size[0])} {unit}",
+        f"a free {key} above 0 in the base model", is_positive=True,
+    )  # fmt: skip
 
 
 def _gain_of_force(base: BaseModel) -> HeldNumber:
@@ -196,15 +147,14 @@ def _gain_of_force(base: BaseModel) -> HeldNumber:
         # A force that is predicted grows with the inertia; from a force that is given the motion falls.
         return relative if base.response is Response.FORCE else 1.0 / (1.0 + relative) - 1.0
 
-    article, word, key = INERTIA[base.coordinate]
+    inertia, other = _inertia(base), INERTIA[base.coordinate][1]
     return replace(
         gain,
-        phrase=f"{gain.phrase} or another {word}",
+        phrase=f"{gain.phrase} or {inertia.phrase}",
         sized=lambda size: (
-            f"{gain.sized(size)}, or {article} {word} {larger_or_smaller(of_inertia(size[0]))} "
-            "(these records do not tell which)"
+            f"{gain.sized(size)}, or {inertia.sized([of_inertia(size[0])])} (these records do not tell which)"
         ),
-        other_key=f"a free {key}",
+        other_key=f"a free {other}",
     )
 
 
@@ -249,15 +199,15 @@ def told_from_number(
     own = beside - search.losses([*columns, *number.columns, *best.term.columns])
     if not number.is_absent and hold(search, own, beside) and own.sum() >= MIN_SHARE_BESIDE * best.gain:
         return steps
-    size = math.hypot(*fitted(search.blocks, columns, number, search.priors, search.nonnegative))
-    if size <= number.farthest and mean_over_error(gains - best.gains) >= TIE_Z:
+    size = fitted(search.blocks, columns, number, search.priors, search.nonnegative)
+    if number.is_possible(size) and mean_over_error(gains - best.gains) >= TIE_Z:
         return [replace(steps[0], accepted=None, tied_with=(), reason=number.better)]
     if number.is_absent:
         rival = ChosenTerm(TermChoice(number.name), 0.0)
         trial = Trial(rival, gains, search.shares(gains, before), at_end=False)
         tied = (*steps[0].tied_with, *tied_terms(search, before, best, [trial]))
         return [replace(steps[0], tied_with=tied), *steps[1:]]
-    if size > number.largest:
+    if math.hypot(*size) > number.largest:
         return steps
     return [replace(steps[0], accepted=None, tied_with=(), reason=number.as_well)]
 

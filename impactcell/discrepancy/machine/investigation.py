@@ -9,6 +9,7 @@ import numpy as np
 
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
+from impactcell.discrepancy.machine.column_slips import slip_in_columns, told_of_slip, with_degrees_asked_for
 from impactcell.discrepancy.machine.establishing import establish
 from impactcell.discrepancy.machine.experiment_design import with_experiments
 from impactcell.discrepancy.machine.finding import MachineFinding
@@ -16,9 +17,10 @@ from impactcell.discrepancy.machine.fine_sampling import finely_sampled
 from impactcell.discrepancy.machine.held_out_stretch import pulls_back
 from impactcell.discrepancy.machine.law_search import with_law
 from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.record_checks import check_blocks, check_columns, check_delay
 from impactcell.discrepancy.machine.record_notes import notes_of_records
 from impactcell.discrepancy.machine.release import from_release
-from impactcell.discrepancy.machine.simulation import simulate_held_out
+from impactcell.discrepancy.machine.simulation import with_simulations
 from impactcell.discrepancy.machine.terms import CATALOGUE
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
 from impactcell.discrepancy.machine.whole_turns import without_wraps
@@ -64,7 +66,8 @@ def investigate_machine(
         data_faults = tuple(one for one in data_faults if one.fault is not Fault.PRESLIDING_ONLY)
     refuse_unusable(campaign, data_faults)
     records = uniform_records(campaign, base)
-    _check_columns(base, records)
+    check_columns(base, records)
+    check_delay(base, records)
     if base.coordinate is not campaign.coordinate:
         raise CampaignError(
             f"the base model is of a {base.coordinate}, the campaign of a {campaign.coordinate}; "
@@ -79,84 +82,32 @@ def investigate_machine(
     candidates = _candidates(base, records)
     notes += _notes_of_columns_with_gaps(records)
     fits = MachineFits(records, base, candidates, _held_records(records, train, test))
-    _check_blocks(fits)
-    finding = _established(fits, [*notes_of(data_faults), *notes], seed)
-    return with_experiments(fits, with_law(fits, finding))
+    check_blocks(fits)
+    notes = [*notes_of(data_faults), *notes]
+    finding = _established(fits, notes, seed)
+    slip = slip_in_columns(fits, finding)
+    if slip is not None:
+        return told_of_slip(fits, finding, slip, notes)
+    return with_experiments(fits, with_degrees_asked_for(with_law(fits, finding)))
 
 
 def _established(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:
     """Establish what the simulation of what was held out does not contradict."""
     contradicted, said = frozenset[str](), list[str]()
     while True:
-        finding = establish(fits, notes, seed, contradicted)
-        models = finding.nominal, finding.final
-        finding = replace(finding, simulated=tuple(simulate_held_out(finding, model) for model in models))
-        before, after = (error.rmse for error in finding.simulated)
-        if not finding.established or after <= MAX_RISE * before:
+        finding = with_simulations(establish(fits, notes, seed, contradicted))
+        before, after = finding.simulated
+        follows = finding.is_at_floor or after.fit_percent > 0.0
+        if not finding.established or (after.rmse <= MAX_RISE * before.rmse and follows):
             return replace(finding, notes=(*finding.notes, *said))
         last = finding.established[-1]
         contradicted |= {last}
+        constant = after.rmse / (1.0 - after.fit_percent / 100.0)
+        other = f"{before.rmse:.3g} without" if follows else f"a constant {constant:.3g}"
         said.append(
             f"{in_words(last)}: held-out blocks want it, but simulated open loop, held-out records are "
-            f"{after:.3g} {finding.base.unit} off with it, {before:.3g} without; it is not named."
+            f"{after.rmse:.3g} {finding.base.unit} off with it, {other}; it is not named."
         )
-
-
-def _check_columns(base: BaseModel, records: Sequence[UniformRecord]) -> None:
-    """See that every shot has the columns of `shots.csv` that the base model goes by.
-
-    Raises
-    ------
-    CampaignError
-        One lacks one.
-    """
-    for choice in base.terms:
-        lacking = [str(record.shot) for record in records if choice.covariate not in record.covariates]
-        if choice.covariate and lacking:
-            raise CampaignError(
-                f"{choice.identifier} goes by the column {choice.covariate!r} of shots.csv, which shots "
-                f"{', '.join(lacking)} do not state"
-            )
-
-
-def _check_blocks(fits: MachineFits) -> None:
-    """See that there is something to fit and something held out.
-
-    Raises
-    ------
-    CampaignError
-        There is not.
-    """
-    if not fits.rows().target.size:
-        raise CampaignError(
-            "nowhere does the part move faster than the noise of its position shows: record a larger or "
-            "faster motion, or state noise_std_m (of a rotation noise_std_rad) in campaign.yaml if it is less"
-        )
-    training, held_out = fits.blocks()
-    if len(training) and len(held_out):
-        return
-    thirds, used = fits.held is None, "held out" if len(training) else "fitted"
-    records = [
-        record
-        for place, record in enumerate(fits.records)
-        if fits.held is None or (place in fits.held) is (used == "held out")
-    ]
-    needed_s = fits.block_s * (3.0 if thirds else 1.0)
-    if max(float(record.time_s[-1]) for record in records) >= needed_s:
-        which = "the last third of each record"
-        if not thirds:
-            which = f"shots {', '.join(str(record.shot) for record in records)}"
-        or_gaps = ", or too briefly between gaps in time," if any(record.gaps for record in records) else ""
-        raise CampaignError(
-            f"what is {used} ({which}) moves too little{or_gaps} for a block of {fits.block_s:.3g} s: hold "
-            f"{'whole' if thirds else 'other'} records out (--test), or record a larger or faster motion"
-        )
-    raise CampaignError(
-        f"the records are too short for blocks of {fits.block_s:.3g} s"
-        f"{', of which the last third of each is held out' if thirds else ''}: "
-        f"{'hold whole records out (--test), ' if thirds else ''}make them longer, or say a shorter "
-        "`block_s` in the base model"
-    )
 
 
 def hold_what_cannot_be_seen(

@@ -4,6 +4,7 @@ from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.finding import MachineFinding, MachineLaw
 from impactcell.discrepancy.machine.model_forces import resistance
 from impactcell.discrepancy.machine.rival_forms import SPLINE_PIECES
+from impactcell.discrepancy.search import MAX_EXPECTED_GAP
 
 GIVES_ENERGY = "with the law that fits best friction would give energy in the range that was gone through"
 """Why no law is proposed where held-out blocks confirm one that cannot be."""
@@ -36,6 +37,8 @@ def refusal_of(finding: MachineFinding, law: MachineLaw, tests: int) -> str:
     without, with_it = law.simulated
     if not with_it.rmse < without.rmse:
         return "simulated open loop, the law that fits best errs no less on held-out records than no law"
+    if with_it.fit_percent <= 0.0 and law.fall.after > MAX_EXPECTED_GAP:
+        return "simulated open loop, the law that fits best errs more on held-out records than a constant"
     least, largest = resistance(finding, law.model)
     if least < -NEGATIVE_SHARE * largest:
         return GIVES_ENERGY

@@ -7,7 +7,6 @@ themselves. Held-out blocks and the held-out simulation decide; where they do no
 tried, and the error of the test is shared among all that may be.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -21,14 +20,8 @@ from impactcell.discrepancy.machine.free_splines import (
     tangent_of,
     with_spline,
 )
-from impactcell.discrepancy.machine.held_numbers import (
-    NEARLY_ALL,
-    HeldNumber,
-    does_as_well,
-    fitted,
-    held_numbers,
-    sampling_step_s,
-)
+from impactcell.discrepancy.machine.held_number import HeldNumber
+from impactcell.discrepancy.machine.held_numbers import NEARLY_ALL, does_as_well, fitted, numbers_held
 from impactcell.discrepancy.machine.law_proof import proved_form
 from impactcell.discrepancy.machine.law_refusal import (
     GIVES_ENERGY,
@@ -177,15 +170,15 @@ class _LookedAt:
         """
         fits, columns = self.fits, self.model.fit.columns
         found = []
-        for number in held_numbers(fits.base, sampling_step_s(fits.records)):
+        for number in numbers_held(fits.base, fits.records, fits.scale):
             gains = self.before - out_of_fold_losses(
                 self.training, [*columns, *number.columns], fits.priors, fits.nonnegative
             )
             least = least_of_delay if number.is_delay else 0.0
             if float(gains.sum()) < least or mean_over_error(gains) < MIN_GAIN_Z:
                 continue
-            size = math.hypot(*fitted(self.training, columns, number, fits.priors, fits.nonnegative))
-            if size <= number.farthest:
+            size = fitted(self.training, columns, number, fits.priors, fits.nonnegative)
+            if number.is_possible(size):
                 found.append((number, gains))
         return sorted(found, key=lambda one: -float(one[1].sum()))
 

@@ -12,7 +12,7 @@ from impactcell.discrepancy.machine.base_model import PRIOR_REACH, BaseModel, Nu
 from impactcell.discrepancy.machine.block_plan import BlockPlan
 from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, row_weights, weighed
 from impactcell.discrepancy.machine.finding import FittedModel
-from impactcell.discrepancy.machine.held_numbers import DELAY, HeldNumber
+from impactcell.discrepancy.machine.held_number import DELAY, HeldNumber
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.model_forces import friction_at_rest
 from impactcell.discrepancy.machine.motion_scale import motion_scale

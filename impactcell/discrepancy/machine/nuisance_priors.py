@@ -3,7 +3,7 @@
 import math
 
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior
-from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, Column
+from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, INERTIA_BESIDE, Column
 
 NUISANCES = ("force_gain", "force_offset", "gravity_torque", "position_offset", "inertia", "delay_s")
 """Their names."""
@@ -26,6 +26,9 @@ def nuisance_priors(base: BaseModel, gravity_torque: float) -> dict[Column, Numb
         if prior.is_held or (name == "position_offset" and gravity_torque == 0.0):
             continue
         if name == "force_offset" and base.force_offset_by_record:
+            continue
+        if name == "inertia" and prior.value == 0.0:
+            priors[INERTIA_BESIDE] = NumberPrior(0.0, prior.std)
             continue
         # The column of the inertia is relative to its stated value.
         std = prior.std / prior.value if name == "inertia" and math.isfinite(prior.value) else prior.std

@@ -28,7 +28,12 @@ from impactcell.discrepancy.machine.motion_scale import MotionScale, carried_loa
 from impactcell.discrepancy.machine.smoothing import averaged, smoothed_acceleration, smoothed_speed
 from impactcell.discrepancy.machine.step_forces import Drive, drive_of
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
-from impactcell.discrepancy.machine.weak_form import ECCENTRICITY, direction_of_motion, eccentricity_waves
+from impactcell.discrepancy.machine.weak_form import (
+    ECCENTRICITY,
+    INERTIA_BESIDE,
+    direction_of_motion,
+    eccentricity_waves,
+)
 from impactcell.records import Samples
 
 STEPS_PER_PERIOD = 200
@@ -36,6 +41,12 @@ STEPS_PER_PERIOD = 200
 RUNAWAY = 100.0
 """Times the largest distance from 0 that was measured, beyond which a simulated part goes no further: on a
 spring that softens it has run away, and by how much it errs is told all the same [1]."""
+
+
+def with_simulations(finding: MachineFinding) -> MachineFinding:
+    """Simulate what was held out without and with what is established."""
+    models = finding.nominal, finding.final
+    return replace(finding, simulated=tuple(simulate_held_out(finding, model) for model in models))
 
 
 def simulate_held_out(finding: MachineFinding, model: FittedModel) -> OpenLoopError:
@@ -96,7 +107,8 @@ def needed_force(model: FittedModel, record: UniformRecord, stretch: slice, scal
     deviation = by_zero * np.cos(record.position) - beyond * np.sin(record.position)
     beside = gravity - smooth - model.nuisance("force_offset") + direction * friction - deviation
     force = np.where(is_told(record, scale), averaged(beside, half, record.step_s), np.nan)
-    force += record.inertia * (gain + model.nuisance("inertia")) * acceleration
+    inertia = record.inertia * (gain + model.nuisance("inertia")) + model.value(INERTIA_BESIDE)
+    force += inertia * acceleration
     eccentricity = _eccentricity(model)
     if eccentricity.any():
         wave = eccentricity @ eccentricity_waves(record.position)

@@ -44,6 +44,8 @@ FINER = 9
 """Values between two neighbours of one on the grid of a shape."""
 GAIN: Column = ("force_gain", 0.0, 0)
 """Column of what is measured too large of the force."""
+INERTIA_BESIDE: Column = ("inertia_beside", 0.0, 0)
+"""Column of an inertia beside the stated one, in its unit: of a part that was taken to have none."""
 ECCENTRICITY = "position_eccentricity"
 """Columns of an encoder that turns off its centre: e_c and e_s."""
 
@@ -134,7 +136,8 @@ def _record_rows(
     direction = direction_of_motion(velocity, scale, noise_of_speed)
     resting = _averaged((np.abs(direction) < 1.0).astype(np.float64), weight, centres)
     centres = centres[resting <= MAX_RESTING_SHARE]
-    accelerating = record.inertia * _averaged(record.position, curvature, centres)
+    acceleration = _averaged(record.position, curvature, centres)
+    accelerating = record.inertia * acceleration
     one = np.ones(len(force))
     raw: dict[Column, Samples] = {
         GAIN: force,
@@ -162,6 +165,7 @@ def _record_rows(
                 gravity * np.cos(record.position) * wave, weight, centres
             )
     columns["inertia", 0.0, 0] = -accelerating
+    columns[INERTIA_BESIDE] = -acceleration
     if base.response is Response.FORCE:
         # What is measured is the gain times what a rigid machine would need, and friction in its own unit.
         columns[GAIN] = gravity * columns["gravity_torque", 0.0, 0] - accelerating

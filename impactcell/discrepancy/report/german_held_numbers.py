@@ -18,10 +18,14 @@ PHRASES: Final = {
     "another torque of gravity": "ein anderes Schweremoment",
     "another inertia": "eine andere Trägheit",
     "another mass": "eine andere Masse",
+    "an inertia": "eine Trägheit",
+    "a mass": "eine Masse",
 }
 """What may be off."""
 LATE: Final = {"late": "spät", "early": "früh"}
 """By which side of its time a force was recorded."""
+INERT: Final = {"inertia": "Trägheit", "mass": "Masse"}
+"""What is inert."""
 SIZED: Final[tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...]] = (
     (r"an? force recorded (\S+) ms (late|early)",
      lambda m: f"eine um {m[1]} ms zu {LATE[m[2]]} aufgezeichnete Kraft"),
@@ -35,7 +39,8 @@ SIZED: Final[tuple[tuple[str, str | Callable[[re.Match[str]], str]], ...]] = (
     (r"a torque of gravity (\S+) N m (larger|smaller)",
      lambda m: f"ein um {m[1]} N m {_larger(m[2], 'es')} Schweremoment"),
     (r"an? (inertia|mass) (\S+) % (larger|smaller)",
-     lambda m: f"eine um {m[2]} % {_larger(m[3], 'e')} {'Masse' if m[1] == 'mass' else 'Trägheit'}"),
+     lambda m: f"eine um {m[2]} % {_larger(m[3], 'e')} {INERT[m[1]]}"),
+    (r"an? (inertia|mass) of (\S+ kg(?: m²)?)", lambda m: f"eine {INERT[m[1]]} von {m[2]}"),
 )  # fmt: skip
 """The same with its size."""
 
@@ -59,8 +64,27 @@ def key_of(english: str) -> str:
     if match := re.fullmatch(r"(\w+)(: \{std: SECONDS\})? among the nuisances of the base model", english):
         within = ": {std: SEKUNDEN}" if match[2] else ""
         return f"{match[1]}{within} unter den nuisances des Grundmodells"
-    match = re.fullmatch(r"a free (\w+)( in the base model)?", english)
-    return f"ein freies {match[1]}{' im Grundmodell' if match[2] else ''}" if match else ""
+    match = re.fullmatch(r"a free (\w+)( above 0)?( in the base model)?", english)
+    if match is None:
+        return ""
+    above, inside = " über 0" if match[2] else "", " im Grundmodell" if match[3] else ""
+    return f"ein freies {match[1]}{above}{inside}"
+
+
+def column_slip(english: str) -> str:
+    """Say what a column would be instead of what its name says.
+
+    >>> column_slip("mass_kg in t or force_n in mN")
+    'mass_kg in t oder force_n in mN'
+    >>> column_slip("force_n or position_m turned in shots 2 and 4")
+    'umgedrehtem force_n oder position_m (Messung 2 und 4)'
+    """
+    text = english.replace(" or ", " oder ").replace(" in degrees", " in Grad")
+    match = re.fullmatch(r"(.+) turned(?: in shots? (.+))?", text)
+    if match is None:
+        return text
+    where = f" (Messung {match[2].replace(' and ', ' und ')})" if match[2] else ""
+    return f"umgedrehtem {match[1]}{where}"
 
 
 def _larger(english: str, ending: str) -> str:

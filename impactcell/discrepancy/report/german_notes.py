@@ -7,7 +7,7 @@ was said, and is marked as English.
 import re
 from typing import Final
 
-from impactcell.discrepancy.report.german_held_numbers import held_number, key_of
+from impactcell.discrepancy.report.german_held_numbers import column_slip, held_number, key_of
 from impactcell.discrepancy.report.german_patterns import Patterns, marked, translated
 from impactcell.discrepancy.report.german_words import phrase, term_name
 from impactcell.german.data_faults import german_data_fault, german_message
@@ -205,6 +205,16 @@ NOTES: Final[Patterns] = (
       r"(\S+) without; it is not named\."),
      lambda m: f"{_terms(m[1])}: Zurückgehaltene Blöcke wollen es, aber ohne Rückführung simuliert liegen "
      f"zurückgehaltene Messungen mit ihm um {m[2]} daneben, ohne um {m[3]}; es wird nicht genannt."),
+    ((r"(.+): held-out blocks want it, but simulated open loop, held-out records are (\S+ .+?) off with it, "
+      r"a constant (\S+); it is not named\."),
+     lambda m: f"{_terms(m[1])}: Zurückgehaltene Blöcke wollen es, aber ohne Rückführung simuliert liegen "
+     f"zurückgehaltene Messungen mit ihm um {m[2]} daneben, eine Konstante um {m[3]}; es wird nicht "
+     "genannt."),
+    (r"Records follow the base model with (.+): see which it is, and correct that\.",
+     lambda m: f"Mit {column_slip(m[1])} folgen die Messungen dem Grundmodell: nachsehen, was davon "
+     "zutrifft, und es berichtigen."),
+    (r"A period of (\S+) rad is a turn in degrees: see whether angle_rad is in degrees\.",
+     r"Eine Periode von \1 rad ist eine Umdrehung in Grad: nachsehen, ob angle_rad in Grad ist."),
     (r"(.+?) shows only beside (.+), which hides it on these records; .*",
      lambda m: f"{term_name(m[1])} zeigt sich nur neben „{term_name(m[2])}“, das es auf diesen Messungen "
      f"verdeckt; „{term_name(m[2])}“ wird nicht genannt."),

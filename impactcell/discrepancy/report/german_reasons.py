@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from impactcell.discrepancy.report.german_held_numbers import held_number, key_of
+from impactcell.discrepancy.report.german_held_numbers import column_slip, held_number, key_of
 from impactcell.discrepancy.report.german_patterns import Patterns, marked, translated
 from impactcell.discrepancy.report.german_words import phrase, term_name
 from impactcell.german.parameters import words_of
@@ -38,11 +38,13 @@ REASONS: Final[Patterns] = (
     (r"(an?\w* .+) does as well as any function of speed, load or position",
      lambda m: f"{said} erklärt es so gut wie jede Funktion von Geschwindigkeit, Last oder Ort"
      if (said := held_number(m[1])) else ""),
-    ((r"(\w+[^;]* among the nuisances of the base model(?: or a free \w+)?|a free \w+ in the base model) "
-      r"would tell"),
+    ((r"(\w+[^;]* among the nuisances of the base model(?: or a free \w+)?|"
+      r"a free \w+(?: above 0)? in the base model) would tell"),
      lambda m: f"{key_of(m[1])} zeigte es"),
     (r"simulated open loop, the law that fits best errs no less on held-out records than no law",
      "ohne Rückführung simuliert irrt das beste Gesetz an Zurückgehaltenem nicht weniger als keines"),
+    (r"simulated open loop, the law that fits best errs more on held-out records than a constant",
+     "ohne Rückführung simuliert irrt das beste Gesetz an Zurückgehaltenem mehr als eine Konstante"),
     ((r"the law that fits best stands in for the drive: with it the inertia would be (\S+) times what it is "
       r"without"),
      r"das beste Gesetz steht für den Antrieb: Mit ihm wäre die Trägheit das \1-fache von der ohne"),
@@ -58,6 +60,9 @@ REASONS: Final[Patterns] = (
      lambda m: f"{said} würde mehr erklären als der beste Term" if (said := held_number(m[1])) else ""),
     (r"(an?\w* .+) would explain (\d+) % of it",
      lambda m: f"{said} erklärte {m[2]} % davon" if (said := held_number(m[1])) else ""),
+    (r"with (.+) the base model, simulated open loop, errs (\S+) times as much",
+     lambda m: f"mit {column_slip(m[1])} irrt das Grundmodell, ohne Rückführung simuliert, {m[2]}-mal so "
+     "viel"),
     (r"no term stands out from what all of them close together",
      "kein Term hebt sich von dem ab, was alle zusammen schließen"),
     (r"(.+) comes nearest, at a (.+) of (\S+) (\S+), the (smallest|largest) that is looked for",
