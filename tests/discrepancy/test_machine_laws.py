@@ -27,10 +27,10 @@ from impactcell.discrepancy.machine import (
     Response,
     TermChoice,
     investigate_machine,
-    investigation,
     law_proof,
     law_search,
     simulate_held_out,
+    simulation,
 )
 from impactcell.discrepancy.machine.base_model import LawForm
 from impactcell.discrepancy.machine.finding import FittedModel
@@ -417,7 +417,7 @@ def test_a_swing_is_simulated_nearer_with_the_law_of_the_place_that_pushes(
         return simulate_held_out(finding, model)
 
     monkeypatch.setattr(law_search, "simulate_held_out", counted)
-    monkeypatch.setattr(investigation, "simulate_held_out", counted)
+    monkeypatch.setattr(simulation, "simulate_held_out", counted)
     finding = investigate_machine(pendulum(1e-3), PENDULUM)
     law = finding.law
     assert law is not None

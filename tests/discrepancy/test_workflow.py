@@ -3,6 +3,7 @@
 import functools
 import json
 import re
+from collections.abc import Container
 from dataclasses import replace
 from pathlib import Path
 
@@ -82,8 +83,8 @@ def test_a_hidden_effect_is_named_with_its_parameters(effect: str) -> None:
 
 
 def test_a_confound_that_is_lost_on_few_samples_is_tied_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    def without_mass(context: SearchContext, rough: list[Fit]) -> list[Fit]:
-        return [one for one in finalists(context, rough) if one.effects[-1] != "mass_error"]
+    def without_mass(context: SearchContext, rough: list[Fit], given: Container[str]) -> list[Fit]:
+        return [one for one in finalists(context, rough, given) if one.effects[-1] != "mass_error"]
 
     monkeypatch.setattr("impactcell.discrepancy.search.one_more.finalists", without_mass)
     found = investigate(make("mass_error", shots=18))

@@ -99,15 +99,16 @@ DEGREES = ColumnSlip("angle_rad in degrees", position=DEGREE)
 def slip_in_columns(fits: MachineFits, finding: MachineFinding) -> ColumnSlip | None:
     """Find what columns would have to be for records to follow the base model; None where they do as it is.
 
-    Something has to remain, and nothing be named that the held-out records follow.
+    Something has to remain, and nothing be named that the held-out records follow; but for degrees, for small
+    swings in these look like those of a spring.
     """
     now = finding.simulated[-1].fit_percent
     followed = POOR_FIT_PERCENT if finding.established else FOLLOWED_PERCENT
-    if finding.missing_blocks or finding.is_at_floor or now >= followed:
+    if finding.missing_blocks or finding.is_at_floor:
         return None
     tried = [
         replace(slip, error=(100.0 - fit) / (100.0 - now))
-        for slip in _slips(fits, is_driven=finding.is_driven)
+        for slip in _slips(fits, is_driven=finding.is_driven, is_followed=now >= followed)
         if (fit := _fit_percent(fits, slip, finding.seed)) >= POOR_FIT_PERCENT
     ]
     best = min(tried, key=lambda slip: slip.error, default=None)
@@ -149,12 +150,12 @@ def _periods(finding: MachineFinding) -> list[float]:
     return periods
 
 
-def _slips(fits: MachineFits, *, is_driven: bool) -> Iterator[ColumnSlip]:
+def _slips(fits: MachineFits, *, is_driven: bool, is_followed: bool) -> Iterator[ColumnSlip]:
     """Give what may be: each column is in one unit, and some records are turned."""
     is_rotation = fits.base.coordinate is Coordinate.ROTATION
     if is_rotation:
         yield DEGREES
-    if not is_driven:
+    if is_followed or not is_driven:
         return
     yield from ROTATION if is_rotation else TRANSLATION
     turned = _turned(fits)
