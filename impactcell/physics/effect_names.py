@@ -3,6 +3,9 @@
 import re
 from typing import Final
 
+COLUMN_PREFIX: Final = "free_friction_over_column_"
+"""How identifiers of free-form terms over a column of `shots.csv` begin; behind it stand the column's letters
+and a check of its name."""
 PROPER: Final = {
     "hertz": "Hertz",
     "hunt crossley": "Hunt-Crossley",
@@ -23,7 +26,7 @@ def in_words(identifier: str) -> str:
     >>> in_words("free_friction_over_column_oil_temperature_a3f09b")
     'friction over column oil_temperature'
     """
-    over_column = re.fullmatch(r"free_friction_over_column_(\w+)_[0-9a-f]{6}", identifier)
+    over_column = re.fullmatch(rf"{COLUMN_PREFIX}(\w+)_[0-9a-f]{{6}}", identifier)
     words = f"friction over column {over_column[1]}" if over_column else identifier.replace("_", " ")
     for plain, proper in PROPER.items():
         words = re.sub(rf"\b{plain}\b", proper, words)

@@ -13,13 +13,12 @@ import numpy as np
 
 from impactcell.physics.bspline import spline_basis
 from impactcell.physics.effect import Covariates, Effect, Factors, Kind, Parameter, Phase
+from impactcell.physics.effect_names import COLUMN_PREFIX
 from impactcell.physics.effects import add_effect
 from impactcell.physics.free_form import FreeForm
 from impactcell.physics.free_forms import LOWER, SPANS, UPPER
 from impactcell.records import Samples
 
-COLUMN_PREFIX = "free_friction_over_column_"
-"""How the identifiers of these terms begin; behind it stand the column's letters and a check of its name."""
 MOST_LETTERS = 40
 """Letters of a column's name that are told."""
 TYPICAL = 0.1

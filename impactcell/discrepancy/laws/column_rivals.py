@@ -74,9 +74,10 @@ def _rival_columns(
     context : SearchContext
         With a few samples of each shot.
     """
-    named, *_ = (*refine(context, [one for one in (selection.accepted,) if one is not None]), None)
-    if named is None:
+    accepted = [] if selection.accepted is None else refine(context, [selection.accepted])
+    if not accepted:
         return
+    (named,) = accepted
     patterns = factor_patterns(context.coarse, selection.nominal, effect)
     if not len(patterns):
         return

@@ -11,7 +11,7 @@ from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior
 from impactcell.discrepancy.machine.block_plan import BlockPlan
 from impactcell.discrepancy.machine.establishing import establish
 from impactcell.discrepancy.machine.finding import MachineFinding
-from impactcell.discrepancy.machine.machine_fits import COULOMB, MachineFits
+from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.regression import blocks_of, fit_blocks
 from impactcell.discrepancy.machine.simulation import simulate_held_out, with_simulations
 from impactcell.discrepancy.machine.trials import ChosenTerm
@@ -211,10 +211,7 @@ def _fit_percent(fits: MachineFits, slip: ColumnSlip, seed: int) -> float:
 
 def _without_candidates(fits: MachineFits, slip: ColumnSlip | None = None) -> MachineFits:
     base, records = (fits.base, fits.records) if slip is None else slip.corrected(fits.base, fits.records)
-    level = [
-        choice for choice in fits.candidates if choice.identifier == COULOMB[0]
-    ]  # rows are weighed by it
-    return MachineFits(records, base, level, fits.held)
+    return fits.without_candidates(base, records)
 
 
 def _scaled(record: UniformRecord, force: float, inertia: float, position: float) -> UniformRecord:

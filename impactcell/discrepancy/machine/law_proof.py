@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel
-from impactcell.discrepancy.machine.machine_fits import COULOMB, MachineFits
+from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.proof import fall_of_gap
 from impactcell.discrepancy.machine.trials import ChosenTerm
 
@@ -22,8 +22,7 @@ def proved_form(
     """
     terms = (*model.terms, ChosenTerm(form, 0.0))
     base = replace(fits.base, terms=tuple(term.choice for term in terms))
-    level = tuple(one for one in fits.candidates if one.name == COULOMB[0])  # rows are weighed by it
-    own = MachineFits(fits.records, base, level, fits.held)
+    own = fits.without_candidates(base, fits.records)
     own.gravity, own.priors, own.delay_s, own.doubt = fits.gravity, fits.priors, fits.delay_s, fits.doubt
     own.shapes = {name: fits.shapes.get(name, shapes) for name, shapes in own.shapes.items()}
     for _ in range(WEIGHINGS):

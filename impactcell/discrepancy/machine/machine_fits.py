@@ -94,6 +94,11 @@ class MachineFits:
         fits.shapes = dict(self.shapes)
         return fits
 
+    def without_candidates(self, base: BaseModel, records: Sequence[UniformRecord]) -> Self:
+        """Fit a base model to records beside nothing but the level of friction, by which rows are weighed."""
+        level = [choice for choice in self.candidates if choice.name == COULOMB[0]]
+        return type(self)(records, base, level, self.held)
+
     def _build(self, gravity: float, delay_s: float) -> Rows:
         shapes = self._shapes_of((*self.base.terms, *self.candidates))
         return build_rows(self.records, self.base, shapes, (gravity, delay_s))

@@ -16,8 +16,9 @@ from impactcell.discrepancy.data import CellLimits, PreparedShot, ShotSet, conca
 from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
 from impactcell.errors import PhysicsError
 from impactcell.physics import Kind
+from impactcell.physics.effect_names import COLUMN_PREFIX
 from impactcell.physics.effects import LIBRARY, find_effect
-from impactcell.physics.free_column_forms import COLUMN_PREFIX, printed
+from impactcell.physics.free_column_forms import printed
 from impactcell.records import Samples
 
 POWER = 0.9
