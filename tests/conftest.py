@@ -1,4 +1,4 @@
-"""Shared by all tests: where the sample data lie, and no asyncio task may outlive its test."""
+"""Shared by all tests: which run, where the sample data lie, and no asyncio task may outlive its test."""
 
 import asyncio
 import gc
@@ -14,6 +14,7 @@ import pytest
 import pytest_asyncio
 from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
+from xdist.workermanage import WorkerController
 
 import impactcell  # noqa: F401  # says how many threads numpy takes, and so comes before numpy
 from tests.between_workers import share_in
@@ -62,13 +63,43 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(DoctestsOfTheProduct())
 
 
+def is_quick(config: pytest.Config) -> bool:
+    """Say whether slow tests are left out: nothing is named, and it is not CI."""
+    if hasattr(config, "workerinput"):
+        return bool(config.workerinput["is_quick"])
+    return not config.getoption("file_or_dir") and os.environ.get("IMPACTCELL_CI") != "1"
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: WorkerController) -> None:
+    """Tell each worker, to which all directories are named."""
+    node.workerinput["is_quick"] = is_quick(node.config)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Say what was left out, and how it is run."""
+    if is_quick(config):
+        terminalreporter.write_line(
+            'Tests that take a second or more were left out: ARGS="tests impactcell" runs all.'
+        )
+
+
+def leave_out_slow_tests(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Take those that are marked as slow, or as long, from what was collected."""
+    is_slow = [any(item.iter_markers("slow")) or any(item.iter_markers("long")) for item in items]
+    config.hook.pytest_deselected(items=list(compress(items, is_slow)))
+    items[:] = list(compress(items, map(not_, is_slow)))
+
+
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Have each worker begin with some of the long tests: all would wait for one that began last.
+    """Leave out slow tests of a quick run, and have each worker begin with some of the long ones.
 
-    Workers are given as many neighbouring tests each, and then take from each other; those of a file stay
-    together, for they may have fixtures in common.
+    All would wait for one that began last. Workers are given as many neighbouring tests each, and then take
+    from each other; those of a file stay together, for they may have fixtures in common.
     """
+    if is_quick(config):
+        leave_out_slow_tests(config, items)
     workers: int = getattr(config, "workerinput", {"workercount": 1})["workercount"]
     is_long = [item.get_closest_marker("long") is not None for item in items]
     long, short = list(compress(items, is_long)), compress(items, map(not_, is_long))

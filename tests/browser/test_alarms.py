@@ -71,6 +71,7 @@ def listed(browser: Browser) -> set[str]:
     return {article.get_attribute("data-alarm") for article in browser.all("#open article")}
 
 
+@pytest.mark.slow
 def test_a_tab_that_was_opened_behind_others_lists_what_is_when_it_comes_in_front(
     server: PageServer, browser: Browser
 ) -> None:
@@ -83,6 +84,7 @@ def test_a_tab_that_was_opened_behind_others_lists_what_is_when_it_comes_in_fron
     browser.until(lambda: listed(browser) == after, "the alarm that came meanwhile")
 
 
+@pytest.mark.slow
 def test_a_list_is_asked_for_where_it_has_changed_and_no_more(server: PageServer, browser: Browser) -> None:
     open_with(browser, server, ROWS_ASKED_FOR)
     put(server, "WearLimit", 8)
@@ -94,6 +96,7 @@ def test_a_list_is_asked_for_where_it_has_changed_and_no_more(server: PageServer
     assert browser.run("return rows_asked_for") <= 2
 
 
+@pytest.mark.slow
 def test_what_somebody_writes_stays_until_he_wants_the_list_anew(
     server: PageServer, browser: Browser
 ) -> None:

@@ -141,6 +141,7 @@ def is_offline(browser: Browser) -> bool:
     return "No connection to the service" in browser.text and states(browser) == {"? unknown"}
 
 
+@pytest.mark.slow
 async def test_a_link_that_is_cut(relay: Relay, browser: Browser) -> None:
     await asyncio.to_thread(enter, browser, relay)
     await relay.cut()
@@ -152,6 +153,7 @@ async def test_a_link_that_is_cut(relay: Relay, browser: Browser) -> None:
     await asyncio.to_thread(browser.until, back, "cells that are live again")
 
 
+@pytest.mark.slow
 async def test_a_link_that_falls_silent(relay: Relay, browser: Browser) -> None:
     """As with a cable that is pulled: no end of the connection ever comes."""
     await asyncio.to_thread(enter, browser, relay)
@@ -163,6 +165,7 @@ async def test_a_link_that_falls_silent(relay: Relay, browser: Browser) -> None:
     await asyncio.to_thread(browser.until, back, "cells that are live again")
 
 
+@pytest.mark.slow
 async def test_of_many_tabs_only_the_one_in_front_holds_a_connection(
     server: PageServer, relay: Relay, browser: Browser
 ) -> None:
@@ -188,6 +191,7 @@ async def test_of_many_tabs_only_the_one_in_front_holds_a_connection(
         browser.driver.switch_to.window(first)
 
 
+@pytest.mark.slow
 async def test_a_tab_that_comes_in_front_again_is_as_of_now(
     server: PageServer, relay: Relay, browser: Browser
 ) -> None:
@@ -208,6 +212,7 @@ async def test_a_tab_that_comes_in_front_again_is_as_of_now(
     assert not browser.all("#offline:not([hidden])")
 
 
+@pytest.mark.slow
 async def test_a_tab_that_comes_in_front_again_without_the_service_says_so(
     server: PageServer, relay: Relay, browser: Browser
 ) -> None:
@@ -224,6 +229,7 @@ async def test_a_tab_that_comes_in_front_again_without_the_service_says_so(
     await asyncio.to_thread(browser.until, back, "cells that are live again")
 
 
+@pytest.mark.slow
 async def test_a_tab_behind_others_is_not_logged_out(
     server: PageServer, relay: Relay, browser: Browser
 ) -> None:
@@ -240,6 +246,7 @@ async def test_a_tab_behind_others_is_not_logged_out(
     assert not server.feed.viewers
 
 
+@pytest.mark.slow
 async def test_the_notice_stays_in_sight(relay: Relay, browser: Browser) -> None:
     browser.show_as("light", PHONE)
     await asyncio.to_thread(enter, browser, relay)
@@ -256,6 +263,7 @@ async def test_the_notice_stays_in_sight(relay: Relay, browser: Browser) -> None
     assert 0 <= top[1] < 20
 
 
+@pytest.mark.slow
 async def test_what_to_look_at_is_named_above_many_cells(
     server: PageServer, relay: Relay, browser: Browser
 ) -> None:

@@ -21,6 +21,7 @@ GROUND = "return Math.max(...getComputedStyle(document.body).backgroundColor.mat
 pytestmark = pytest.mark.browser
 
 
+@pytest.mark.slow
 def test_the_report_of_a_machine(browser: Browser, tmp_path: Path) -> None:
     """It stands alone, says what a noise floor is, and can be read on a desk and on a phone."""
     write(slide(0.6), tmp_path / "campaign")

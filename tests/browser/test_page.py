@@ -51,6 +51,7 @@ async def shop(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Shop]:
         yield shop
 
 
+@pytest.mark.slow
 async def test_each_cycle_comes_to_a_page_that_stays_open(shop: Shop, browser: Browser) -> None:
     await shop.beside(lambda: enter(browser, shop, "olga"))
     card = f'[data-cell="{CELL}"]'
@@ -66,6 +67,7 @@ async def test_each_cycle_comes_to_a_page_that_stays_open(shop: Shop, browser: B
     assert float(shown) == pytest.approx(shop.last.friction.mu_s.value, abs=0.05)
 
 
+@pytest.mark.slow
 async def test_an_alarm_that_is_acknowledged_here_is_acknowledged_over_opc_ua(
     shop: Shop, browser: Browser
 ) -> None:
@@ -101,6 +103,7 @@ async def test_an_alarm_that_is_acknowledged_here_is_acknowledged_over_opc_ua(
     ]
 
 
+@pytest.mark.slow
 async def test_a_wrong_password_leads_nowhere(shop: Shop, browser: Browser) -> None:
     def guess() -> str:
         browser.open(f"{shop.page}/system")
@@ -113,6 +116,7 @@ async def test_a_wrong_password_leads_nowhere(shop: Shop, browser: Browser) -> N
     await shop.beside(lambda: browser.until(lambda: browser.path == "/system", "where it was going"))
 
 
+@pytest.mark.slow
 async def test_an_observer_sees_all_and_is_offered_nothing(shop: Shop, browser: Browser) -> None:
     await shop.watched.alarm(CELL, "WearLimit", active=True)
 
@@ -132,6 +136,7 @@ async def test_an_observer_sees_all_and_is_offered_nothing(shop: Shop, browser: 
     assert await shop.beside(lambda: browser.run(script, token, CELL)) == 403
 
 
+@pytest.mark.slow
 async def test_a_session_that_ends_leads_to_the_login(shop: Shop, browser: Browser) -> None:
     users = read_users(shop.directory / "users.yaml")
     guest = with_password(User("guest", Role.OBSERVER), "for-a-while")
@@ -148,6 +153,7 @@ async def test_a_session_that_ends_leads_to_the_login(shop: Shop, browser: Brows
     assert "The session is over" in await shop.beside(lambda: browser.text)
 
 
+@pytest.mark.slow
 async def test_a_script_in_a_batch_id_is_shown_as_text(shop: Shop, browser: Browser) -> None:
     def look() -> None:
         enter(browser, shop, "olga")
@@ -164,6 +170,7 @@ async def test_a_script_in_a_batch_id_is_shown_as_text(shop: Shop, browser: Brow
     await shop.beside(look)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("language", ["en", "de"])
 @pytest.mark.parametrize(("theme", "size"), [("light", DESK), ("dark", DESK), ("light", PHONE)], ids=str)
 async def test_every_page(
@@ -228,6 +235,7 @@ LIMIT_IS_DRAWN = """
 """
 
 
+@pytest.mark.slow
 async def test_the_wear_limit_is_drawn_as_soon_as_it_is_known(shop: Shop, browser: Browser) -> None:
     def look() -> None:
         enter(browser, shop, "olga")
@@ -255,6 +263,7 @@ SUBMIT = """
 """Sends a form that no page of ours offers."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("theme", "size", "language"), [("dark", DESK, "en"), ("light", PHONE, "de")], ids=str
 )
@@ -303,6 +312,7 @@ async def test_every_page_of_a_refusal(
     await shop.beside(look)
 
 
+@pytest.mark.slow
 async def test_a_screen_on_the_wall(shop: Shop, browser: Browser, tmp_path: Path) -> None:
     """Has larger letters, and nothing that keeps people from reading it."""
     pictures = Path(os.environ.get("IMPACTCELL_SCREENSHOTS") or tmp_path)
@@ -320,6 +330,7 @@ async def test_a_screen_on_the_wall(shop: Shop, browser: Browser, tmp_path: Path
     await shop.beside(look)
 
 
+@pytest.mark.slow
 async def test_worn_parts_were_replaced(shop: Shop, browser: Browser) -> None:
     """An engineer says so, the level is learned anew, the audit log has it; an observer is not offered it."""
     form = f'form[action="/cells/{CELL}/reset-wear"]'

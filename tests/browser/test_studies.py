@@ -85,6 +85,7 @@ def is_report_painted(browser: Browser, picture: Path, theme: str) -> bool:
     return is_painted and (float(np.median(inside)) < 0.5) is (theme == "dark")
 
 
+@pytest.mark.slow
 async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Browser, tmp_path: Path) -> None:
     table = write_measurement(tmp_path)
     pictures = Path(os.environ.get("IMPACTCELL_SCREENSHOTS") or tmp_path)
@@ -181,6 +182,7 @@ async def test_drop_name_accept_and_see_the_gap_close(shop: Shop, browser: Brows
     assert yaml.safe_load(model.read_text())["name"] == "prototype"
 
 
+@pytest.mark.slow
 async def test_markup_in_the_name_of_a_file_is_text(shop: Shop, browser: Browser, tmp_path: Path) -> None:
     table = tmp_path / "versuch <b>3.csv"
     table.write_text("a;b\n1;2\n2;3\n")
@@ -202,6 +204,7 @@ async def test_markup_in_the_name_of_a_file_is_text(shop: Shop, browser: Browser
     assert "--column" not in shown
 
 
+@pytest.mark.slow
 async def test_what_cannot_be_read_is_said_and_a_script_in_a_name_is_text(
     shop: Shop, browser: Browser, tmp_path: Path
 ) -> None:
@@ -222,6 +225,7 @@ async def test_what_cannot_be_read_is_said_and_a_script_in_a_name_is_text(
     assert "10000 columns" in await shop.beside(lambda: drop(tmp_path / "wide.csv"))
 
 
+@pytest.mark.slow
 async def test_an_observer_looks_and_drops_nothing(shop: Shop, browser: Browser) -> None:
     def look() -> str:
         enter(browser, shop, "olga")

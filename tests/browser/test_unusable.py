@@ -85,6 +85,7 @@ def enter(browser: Browser, server: PageServer) -> None:
     browser.find(f'[data-cell="{UNKNOWN}"][data-cycle]')
 
 
+@pytest.mark.slow
 async def test_what_is_not_known_is_a_dash_and_says_why(
     server: PageServer, browser: Browser, tmp_path: Path
 ) -> None:
@@ -102,6 +103,7 @@ async def test_what_is_not_known_is_a_dash_and_says_why(
     await asyncio.to_thread(look)
 
 
+@pytest.mark.slow
 async def test_taps_to_a_target_fit_a_phone(server: PageServer, browser: Browser, tmp_path: Path) -> None:
     def look() -> None:
         enter(browser, server)
@@ -117,6 +119,7 @@ async def test_taps_to_a_target_fit_a_phone(server: PageServer, browser: Browser
     await asyncio.to_thread(look)
 
 
+@pytest.mark.slow
 async def test_a_module_that_answers_is_not_called_live(server: PageServer, browser: Browser) -> None:
     """What the system page shows is of when it was opened, also where no cycle has come for long."""
 
@@ -133,6 +136,7 @@ async def test_a_module_that_answers_is_not_called_live(server: PageServer, brow
     assert "Stand: " in text
 
 
+@pytest.mark.slow
 async def test_a_file_that_is_not_taken_says_why(
     server: PageServer, browser: Browser, tmp_path: Path
 ) -> None:

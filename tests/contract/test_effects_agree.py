@@ -14,6 +14,8 @@ from impactcell.physics.effects import LIBRARY
 from simulator import plant as simulated
 from simulator import plant_integrator
 
+pytestmark = pytest.mark.slow
+
 CASES = 4
 MIXTURES = 24
 

@@ -16,6 +16,8 @@ import pytest
 
 from impactcell.physics.effects import LIBRARY
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 EFFECT = '''
 """A constant force along +1."""

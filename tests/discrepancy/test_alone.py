@@ -13,6 +13,8 @@ from impactcell.discrepancy.model.problem import Problem
 from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
 from tests.discrepancy.study import Job, campaign
 
+pytestmark = pytest.mark.slow
+
 ON_THE_FLOOR = 1.05
 
 

@@ -11,6 +11,7 @@ from impactcell.settings.model_file import read_model
 from tests.discrepancy.test_workflow import make
 
 
+@pytest.mark.slow
 def test_findings_are_looked_at_and_written(tmp_path: Path) -> None:
     result = impactcell.discrepancy(make("viscous_friction", shots=24), seed=4)
     assert result.verdict == "named"

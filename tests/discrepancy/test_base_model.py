@@ -79,6 +79,7 @@ def base_of(tmp_path: Path, text: str) -> BaseModel:
     return read_base_model(file)[0]
 
 
+@pytest.mark.slow
 def test_drag_is_named_and_the_zero_of_the_sensor_is_not(tmp_path: Path) -> None:
     finding = investigate_machine(pendulum(swings(4e-4, offset=0.02)), base_of(tmp_path, PENDULUM))
     assert (finding.verdict, finding.established) == ("named", ("quadratic_drag",))
@@ -91,6 +92,7 @@ def test_drag_is_named_and_the_zero_of_the_sensor_is_not(tmp_path: Path) -> None
     assert after < 0.1 * before
 
 
+@pytest.mark.slow
 def test_what_is_stated_of_the_sensors_is_believed(tmp_path: Path) -> None:
     """Exact, it is not fitted again; uncertain, what is told is the whole of it and not the rest."""
     told = {}
@@ -127,11 +129,13 @@ def test_nothing_is_named_where_nothing_is_hidden(tmp_path: Path) -> None:
     assert (finding.verdict, finding.established) == ("no_gap", ())
 
 
+@pytest.mark.slow
 def test_viscous_friction_is_told_from_drag(tmp_path: Path) -> None:
     finding = investigate_machine(pendulum(swings(0.0, viscous=1e-3)), base_of(tmp_path, PENDULUM))
     assert finding.established == ("viscous_friction",)
 
 
+@pytest.mark.slow
 def test_a_few_swings_test_nothing(tmp_path: Path) -> None:
     base = base_of(tmp_path, PENDULUM + "block_s: 4\n")
     finding = investigate_machine(pendulum(swings(4e-4)[:4]), base, test="4")
@@ -173,6 +177,7 @@ def test_friction_by_a_column_is_told_from_the_speed_that_falls_with_it() -> Non
     assert not investigate_machine(seal(0.0), SEAL).established
 
 
+@pytest.mark.slow
 def test_what_the_simulation_contradicts_is_not_named(monkeypatch: pytest.MonkeyPatch) -> None:
     """The simulation of held-out records is made to err more with the friction by the column."""
     name, rise = "covariate_friction(pressure_bar)", [1.05]
@@ -197,6 +202,7 @@ def test_what_the_simulation_contradicts_is_not_named(monkeypatch: pytest.Monkey
     assert "mit ihm um 1,2 N daneben, ohne um 1; es wird nicht genannt" in said
 
 
+@pytest.mark.slow
 def test_whole_way_by_the_command_line(tmp_path: Path) -> None:
     write(pendulum(swings(4e-4)), tmp_path / "campaign")
     (tmp_path / "base.yaml").write_text(PENDULUM, encoding="utf-8")
@@ -215,6 +221,7 @@ def test_whole_way_by_the_command_line(tmp_path: Path) -> None:
     assert again.verdict == "no_gap"
 
 
+@pytest.mark.slow
 def test_inertia_that_a_free_motion_cannot_show_is_held_and_said_so(tmp_path: Path) -> None:
     text = PENDULUM.replace("inertia_kg_m2: 0.02", "inertia_kg_m2: {value: 0.02, std: 0.002}")
     finding = investigate_machine(pendulum(swings(4e-4)), base_of(tmp_path, text))

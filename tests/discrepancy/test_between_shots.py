@@ -108,6 +108,7 @@ def test_what_the_factors_speak_for_as_much_is_tied_whether_it_acts_between_shot
     assert between_shots.factor_rivals(best, [best, other], 30) == tied
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 4])
 def test_a_tilt_is_as_strong_as_the_friction_factors_ask_for(seed: int) -> None:
     """The traces say nothing: the factors of uphill and downhill taps differ by 2 tan(a) / mu."""

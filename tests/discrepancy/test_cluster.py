@@ -44,6 +44,7 @@ def test_two_worker_processes_change_nothing(tmp_path: Path, monkeypatch: pytest
     assert here == there
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("default")
 def test_workers_know_an_effect_of_the_users_own(tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")

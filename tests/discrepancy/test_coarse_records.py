@@ -67,6 +67,7 @@ def _base(tmp_path_factory: pytest.TempPathFactory) -> BaseModel:
     return read_base_model(file)[0]
 
 
+@pytest.mark.slow
 def test_a_hardening_spring_is_found_with_nine_samples_a_period(base: BaseModel) -> None:
     """In motions of a tenth of a millimetre, whose cube is 1e-12 m³."""
     finding = investigate_machine(Campaign(Excitation.DRIVEN, oscillations(CUBIC)), base)
@@ -83,12 +84,14 @@ def test_a_hardening_spring_is_found_with_nine_samples_a_period(base: BaseModel)
     assert machine_document(finding)["noise_floor"]["noise_std"] == pytest.approx([1e-4, 1e-7], rel=0.5)
 
 
+@pytest.mark.slow
 def test_nothing_is_named_where_the_spring_is_straight(base: BaseModel) -> None:
     finding = investigate_machine(Campaign(Excitation.DRIVEN, oscillations(0.0)), base)
     assert not finding.established
     assert finding.law is None
 
 
+@pytest.mark.slow
 def test_motion_that_counts_as_noise_is_no_reason_to_say_that_nothing_is_missing(base: BaseModel) -> None:
     """Records too short to see how fast they move: what differs between neighbours is what moves."""
     finding = investigate_machine(Campaign(Excitation.DRIVEN, oscillations(CUBIC, 0.8)), base)

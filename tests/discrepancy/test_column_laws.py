@@ -17,6 +17,8 @@ from impactcell.physics.free_column_forms import column_form, printed
 from impactcell.physics.outside_effects import load_effect, offer_effects
 from tests.discrepancy.study import Job, with_column
 
+pytestmark = pytest.mark.slow
+
 COLUMN = "oil temperature (°C)"
 FEW = ("hertz_contact",)
 """A library without anything like what is hidden, and quick to search."""

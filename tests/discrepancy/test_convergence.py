@@ -18,6 +18,8 @@ from impactcell.discrepancy.search.model_selection import select_model
 from impactcell.physics.effects import LIBRARY
 from tests.discrepancy.test_workflow import make
 
+pytestmark = pytest.mark.slow
+
 TILTED = ("surface_tilt", "hunt_crossley_damping")
 
 

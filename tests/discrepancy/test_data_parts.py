@@ -202,6 +202,7 @@ def test_the_floor_is_that_at_rest_where_neighbouring_samples_show_a_part() -> N
     assert "from neighbouring samples" in floor.notes[1]
 
 
+@pytest.mark.slow
 def test_correlated_noise_that_nobody_stated_is_no_gap() -> None:
     """Against what neighbouring samples show it had been a gap of 1.7 noise floors, and `unknown`."""
 
@@ -251,6 +252,7 @@ def test_no_factor_is_told_where_a_ratio_is_nothing() -> None:
     assert german.startswith("Einheit prüfen: position_m oder velocity_mm_per_min (")
 
 
+@pytest.mark.slow
 def test_a_quarter_of_every_setting_is_held_out() -> None:
     """Whether a setting has many shots or one: over 400 splits, as often as chance allows."""
     velocities = np.array([1.0] * 8 + [2.0] * 5 + [3.0])

@@ -46,6 +46,7 @@ def finding_shape(finding: MachineFinding, name: str) -> float:
     return next(term.shape for term in finding.final.terms if term.choice.name == name)
 
 
+@pytest.mark.slow
 def test_the_slides_of_these_tests_go_as_an_integrator_with_events_says() -> None:
     """One push beyond friction that ends: sliding, then at rest for good."""
     step, drive = 1e-5, 4.0
@@ -66,6 +67,7 @@ def test_the_slides_of_these_tests_go_as_an_integrator_with_events_says() -> Non
     assert path[-1] == path[-2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [QUIET, NOISY])
 def test_a_slide_that_sticks_at_its_reversals_has_no_gap(noise: tuple[float, float]) -> None:
     finding = investigate_machine(slides(lambda rng: sines(4.0, rng), noise), SLIDE)
@@ -82,6 +84,7 @@ def test_a_slide_that_rests_half_of_the_time_has_no_gap() -> None:
     assert value_of(finding, "coulomb_friction") == pytest.approx(COULOMB_N, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_a_drive_of_levels_has_no_gap() -> None:
     """Every level makes a kink in the speed: where noise allows it is smoothed over a few samples only."""
     finding = investigate_machine(slides(lambda rng: levels(8.0, 0.4, rng), (0.0, 1e-5)), SLIDE)
@@ -89,6 +92,7 @@ def test_a_drive_of_levels_has_no_gap() -> None:
     assert value_of(finding, "viscous_friction") == pytest.approx(VISCOUS_N_S_PER_M, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_what_a_delay_would_explain_is_said_first() -> None:
     """A measured force jumps anywhere between two samples: half a sample early, on the mean."""
     records = slides(lambda rng: levels(8.0, 0.4, rng), (0.05, 1e-5))
@@ -104,12 +108,14 @@ def test_what_a_delay_would_explain_is_said_first() -> None:
     assert free.final.delay_s == pytest.approx(-2e-3, rel=0.1)
 
 
+@pytest.mark.slow
 def test_few_samples_in_a_period_have_no_gap() -> None:
     """At 50 Hz a reversal lies anywhere within a fifteenth of a swing."""
     records = slides(lambda rng: sines(4.0, rng), QUIET, rate_hz=50.0, duration_s=24.0)
     assert investigate_machine(records, SLIDE).verdict == "no_gap"
 
 
+@pytest.mark.slow
 def test_what_is_hidden_beside_reversals_is_found_and_nothing_remains() -> None:
     def friction(_place: Samples, speed: Samples) -> Samples:
         return COULOMB_N + 6.0 * speed**2
@@ -121,6 +127,7 @@ def test_what_is_hidden_beside_reversals_is_found_and_nothing_remains() -> None:
     assert value_of(finding, "quadratic_drag") == pytest.approx(6.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_nothing_remains_beside_a_free_delay_either() -> None:
     """Without viscous friction the delay takes over what it can of it; with it, it goes back to none."""
     knows_less = replace(SLIDE, terms=SLIDE.terms[:1], delay_s=NumberPrior(0.0, 5e-3))
@@ -131,6 +138,7 @@ def test_nothing_remains_beside_a_free_delay_either() -> None:
     assert finding.fall.after < finding.expected[1]
 
 
+@pytest.mark.slow
 def test_a_stribeck_speed_is_found_between_the_points_of_its_grid() -> None:
     """Of eight campaigns like it the farthest was 9 % off; 24 % where stops counted as less uncertain."""
 

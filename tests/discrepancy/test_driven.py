@@ -19,6 +19,8 @@ from impactcell.discrepancy.workflow import investigate
 from impactcell.errors import CampaignError
 from tests.benchmarks._discrepancy_driven import LISTED, Job, record
 
+pytestmark = pytest.mark.slow
+
 FEW = ("viscous_friction", "quadratic_drag", "surface_tilt", "force_sensor_offset")
 
 

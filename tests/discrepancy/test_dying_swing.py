@@ -18,6 +18,8 @@ from impactcell.discrepancy.report import german_machine_sentences, machine_sent
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.records import Capture, Channel
 
+pytestmark = pytest.mark.slow
+
 GRAVITY, COULOMB = 30.0, 0.1
 """m g l and Coulomb friction over the inertia, 1/s²: at rest after a minute from 1.2 rad."""
 PENDULUM = BaseModel(

@@ -31,6 +31,8 @@ from impactcell.settings.base_model import base_model_text, read_base_model
 from tests.discrepancy.test_base_model import NOISE, PENDULUM, base_of, pendulum, swings
 from tests.discrepancy.test_machine_laws import pendulum as pushed
 
+pytestmark = pytest.mark.slow
+
 COSINE, SINE = 2.0e-3, -1.2e-3
 """Of the encoder [rad]."""
 FREE = PENDULUM + "  position_eccentricity: {std: 0.005}\n"

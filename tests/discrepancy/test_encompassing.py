@@ -89,6 +89,7 @@ def test_no_change_falls_by_nothing() -> None:
     assert acting_shots(np.ones(7)) == pytest.approx(7.0)
 
 
+@pytest.mark.slow
 def test_hard_and_light_taps_are_held_out_alike() -> None:
     job = study.Job("single", ("force_saturation",), 3, shots=40)
     prepared = prepare(study.campaign(job))
@@ -105,6 +106,7 @@ def test_hard_and_light_taps_are_held_out_alike() -> None:
     assert len({tuple(split_held_out(prepared, seed)[1]) for seed in range(20)}) > 10
 
 
+@pytest.mark.slow
 def test_a_gap_that_one_tap_shows_is_seen_to_close_by_how_well_the_change_fits() -> None:
     """By signs at random p was 0.14 where the held-out gap fell from 5.2 to 1.1 noise floors."""
     found = study.name_effects(study.campaign(study.Job("single", ("viscous_friction",), 3, shots=24)))

@@ -29,6 +29,8 @@ from impactcell.records import MM_PER_MIN
 from tests.discrepancy.test_convergence import fitted
 from tests.discrepancy.test_workflow import make
 
+pytestmark = pytest.mark.slow
+
 BATCHES = ("7", "9", "11")
 
 

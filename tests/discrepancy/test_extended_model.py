@@ -24,6 +24,8 @@ from tests.benchmarks._discrepancy_driven import Job, record
 from tests.discrepancy.study import write_blank_report
 from tests.discrepancy.test_verdicts import free_slides
 
+pytestmark = pytest.mark.slow
+
 CELL = Path("config/cells/prototype.yaml")
 
 

@@ -16,6 +16,8 @@ from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.records import Capture, Channel, Samples
 from tests.discrepancy.stick_slip import SLIDE, sines, slides
 
+pytestmark = pytest.mark.slow
+
 RATE_HZ = 500.0
 NOISE_N, NOISE_M = 0.2, 1e-5
 

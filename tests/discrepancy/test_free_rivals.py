@@ -65,6 +65,7 @@ def test_a_force_of_which_nobody_knows_the_form_is_named_after_nothing(seed: int
     assert found.added == ()
 
 
+@pytest.mark.slow
 def test_a_term_that_leaves_something_is_given_more_pieces_alone_and_beside_the_effect() -> None:
     """A model error with many waves hid an adhesion: beside a curve of few pieces it left 1.13 floors."""
     place, seed, held = "free_force_over_position", 720_023, []
@@ -284,6 +285,7 @@ def test_no_filter_is_fitted_where_no_force_was_recorded() -> None:
         assert fit_free_forms(context, _leaving(20.0)).alone == ()
 
 
+@pytest.mark.slow
 def test_a_delay_is_not_established_in_the_place_of_a_lag() -> None:
     job = Job(
         "removed", ("force_sensor_lag",), 9_030_008, target=4.0, shots=SHOTS, removed="force_sensor_lag"

@@ -24,6 +24,8 @@ from impactcell.physics.bspline import spline_basis
 from impactcell.physics.free_forms import FINER
 from tests.discrepancy.study import Job, campaign
 
+pytestmark = pytest.mark.slow
+
 
 def _fitted(hidden: str, strength: float = 1.0, shots: int = 24) -> tuple[Problem, Fit, Problem]:
     prepared = prepare(campaign(Job("free", (hidden,), 8101, strength=strength, shots=shots)))

@@ -9,6 +9,8 @@ from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, Response, investigate_machine
 from impactcell.records import Capture, Channel
 
+pytestmark = pytest.mark.slow
+
 INERTIA, GRAVITY, SHARE = 0.007, 0.45, 0.18
 """Of the arm [kg m², N m], and friction over what the gears carry."""
 ARM = BaseModel(

@@ -71,6 +71,7 @@ def pages(found: DiscrepancyResult, tmp_path_factory: pytest.TempPathFactory) ->
     return {language: (directory / name).read_text(encoding="utf-8") for language, name in REPORTS.items()}
 
 
+@pytest.mark.slow
 def test_both_are_whole_and_show_the_same_numbers(pages: dict[str, str]) -> None:
     both = {}
     for language, text in pages.items():
@@ -90,6 +91,7 @@ def test_both_are_whole_and_show_the_same_numbers(pages: dict[str, str]) -> None
     assert [with_decimal_commas(re.sub(" to ", " bis ", cell)) for cell in in_tables[0]] == in_tables[1]
 
 
+@pytest.mark.slow
 def test_nothing_is_left_in_english(pages: dict[str, str]) -> None:
     told = {}
     for language, text in pages.items():
@@ -112,6 +114,7 @@ def test_nothing_is_left_in_english(pages: dict[str, str]) -> None:
     assert re.findall(r"\d\.\d+", re.sub(formulas, "", german)) == []
 
 
+@pytest.mark.slow
 def test_pages_of_driven_records_speak_of_blocks(found: DiscrepancyResult, tmp_path: Path) -> None:
     blocks = replace(found, prepared=replace(found.prepared, excitation=STRATEGIES[Excitation.DRIVEN]))
     write_reports(blocks, "a campaign", tmp_path)

@@ -70,6 +70,7 @@ def found() -> MachineFinding:
     return investigate_machine(Campaign(Excitation.DRIVEN, cart(0)), CART)
 
 
+@pytest.mark.slow
 def test_the_steps_of_a_switched_drive_are_no_noise_and_act_until_the_next() -> None:
     finding = found()
     result = machine_document(finding)
@@ -99,6 +100,7 @@ def test_where_a_stretch_lies_is_no_motion_that_a_model_predicts() -> None:
     assert finding.simulated[-1].rmse < error.rmse
 
 
+@pytest.mark.slow
 def test_a_command_that_is_logged_early_is_asked_after_and_found_with_what_is_missing() -> None:
     """By a sample, as by a motor's inductance: a negative delay, to a fiftieth of a sample."""
     campaign = Campaign(Excitation.DRIVEN, cart(1))
@@ -115,6 +117,7 @@ def test_a_command_that_is_logged_early_is_asked_after_and_found_with_what_is_mi
     assert not any("would explain" in note for note in finding.notes)
 
 
+@pytest.mark.slow
 def test_a_delay_goes_no_further_than_its_prior_allows() -> None:
     campaign = Campaign(Excitation.DRIVEN, cart(1))
     finding = investigate_machine(campaign, replace(CART, delay_s=NumberPrior(0.0, 0.001)))
@@ -122,6 +125,7 @@ def test_a_delay_goes_no_further_than_its_prior_allows() -> None:
     assert machine_document(finding)["nominal"]["delay_s"]["at_bound"]
 
 
+@pytest.mark.slow
 def test_nothing_remains_below_a_noise_that_is_stated_too_large() -> None:
     loud = tuple(
         replace(shot, force=replace(shot.force, noise_std=1e4)) for shot in cart(0)[:3] if shot.force

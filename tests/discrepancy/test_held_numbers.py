@@ -156,6 +156,7 @@ def test_a_mass_that_is_held_wrong_is_told_and_is_no_spring(mass_kg: float) -> N
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("off", [1.1, 0.92])
 def test_a_mass_that_is_held_wrong_is_told_beside_the_gain_from_a_given_force(off: float) -> None:
     """A force that is larger by a share and a mass that is smaller by as much make the same motion."""
@@ -301,6 +302,7 @@ def test_an_angle_off_by_more_than_three_degrees_is_no_sensor_s(off: float, *, i
         assert refused is steps
 
 
+@pytest.mark.slow
 def test_an_encoder_is_told_from_swings_that_die_away() -> None:
     """Its gains scatter with the amplitude from block to block, their shares of what is left do not."""
     finding = investigated(FAULTS["an encoder 1 mrad off its centre"], 970_007)

@@ -69,6 +69,7 @@ def test_a_spring_on_an_axis_is_named_where_the_force_is_predicted() -> None:
     assert not any("not looked for" in note for note in finding.notes)
 
 
+@pytest.mark.slow
 def test_a_spring_on_a_slide_is_named_where_the_position_is_predicted() -> None:
     campaign = slides(lambda rng: sines(4.0, rng), (0.02, 1e-5), spring_n_per_m=20.0)
     finding = investigate_machine(campaign, SLIDE)

@@ -45,6 +45,7 @@ def changed(given: Campaign, change: Callable[[Capture], Capture]) -> Campaign:
     return replace(given, shots=tuple(map(change, given.shots)))
 
 
+@pytest.mark.slow
 def test_the_model_of_a_cell_is_the_nominal_one(tmp_path: Path) -> None:
     campaigns.write(make("viscous_friction", shots=18), tmp_path / "campaign")
     discrepancy(tmp_path / "campaign", tmp_path / "out", cell=PROTOTYPE)
@@ -58,6 +59,7 @@ def test_the_model_of_a_cell_is_the_nominal_one(tmp_path: Path) -> None:
     assert fitted == pytest.approx(truth, rel=0.05)
 
 
+@pytest.mark.slow
 def test_captures_of_a_journal_are_as_good_as_a_campaign(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -75,6 +77,7 @@ def test_captures_of_a_journal_are_as_good_as_a_campaign(
     assert fitted[1]["value"] == pytest.approx(fitted[0]["value"], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_model_that_a_journal_was_recorded_with_is_the_nominal_one(tmp_path: Path) -> None:
     model = read_model(Path("config/models/prototype.yaml"))
     with Journal(tmp_path / "j", "press-1") as journal:
@@ -152,6 +155,7 @@ def test_noise_that_is_stated_too_small_is_doubted(share: float, doubted: int) -
     assert all("check noise_std_n of sensors: force in campaign.yaml" in note for note in notes)
 
 
+@pytest.mark.slow
 def test_unequal_rates_and_gaps_in_time_cost_nothing_but_are_said() -> None:
     given = make("viscous_friction", shots=18)
 

@@ -32,6 +32,7 @@ def silent(captures: tuple[Capture, ...]) -> tuple[Capture, ...]:
     return tuple(replace(one, mass_kg=math.nan, stroke_m=math.inf) for one in captures)
 
 
+@pytest.mark.slow
 def test_what_the_module_does_not_report_the_cell_states(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

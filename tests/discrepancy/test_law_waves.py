@@ -31,6 +31,7 @@ def tangent_of(values: np.ndarray, u: np.ndarray, lower: float, upper: float) ->
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=3)
 @given(cycles=st.floats(2.0, 22.0), phase=st.floats(0.0, 2.0 * math.pi), amplitude=st.floats(0.01, 1.0))
 def test_a_wave_of_up_to_two_dozen_is_found(cycles: float, phase: float, amplitude: float) -> None:

@@ -20,6 +20,8 @@ from impactcell.physics.effects import find_effect, withdraw_effect
 from impactcell.physics.outside_effects import offer_effects
 from tests.discrepancy.study import Job, campaign
 
+pytestmark = pytest.mark.slow
+
 FEW = ("hertz_contact", "friction_drift")
 """A library without anything like what is hidden, and quick to search."""
 

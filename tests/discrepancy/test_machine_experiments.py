@@ -23,6 +23,8 @@ from impactcell.discrepancy.machine.uniform_records import uniform_records
 from impactcell.records import Capture, Channel
 from tests.discrepancy.test_base_model import GRAVITY, INERTIA, pendulum, swings
 
+pytestmark = pytest.mark.slow
+
 FRICTION, VISCOUS, DRAG = 6.0, 40.0, 160.0
 """Of a slide: N, N s/m and N s²/m², so that either law has 10 N at 0.25 m/s."""
 SPEED, STROKE = 0.25, 0.4

@@ -97,6 +97,7 @@ def investigated(size: float) -> MachineFinding:
     return investigate_machine(slide(size), SLIDE)
 
 
+@pytest.mark.slow
 def test_a_bump_of_friction_is_found_at_its_place() -> None:
     law = investigated(0.6).law
     assert law is not None
@@ -115,6 +116,7 @@ def test_a_bump_of_friction_is_found_at_its_place() -> None:
     assert np.abs(error).max() < 0.1 * 0.6
 
 
+@pytest.mark.slow
 def test_the_gap_that_is_told_for_a_law_is_that_of_its_file(tmp_path: Path) -> None:
     """Without the bump a free delay takes over some of it, and rows count that know no direction."""
     model = tmp_path / "slide.yaml"
@@ -140,6 +142,7 @@ def test_the_gap_that_is_told_for_a_law_is_that_of_its_file(tmp_path: Path) -> N
     assert again.fall.before == pytest.approx(law.fall.after, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_law_is_proved_where_the_base_model_has_no_dry_friction() -> None:
     """Rows are weighed by its level, and there was no column for it: a traceback."""
     shots = []
@@ -158,6 +161,7 @@ def test_a_law_is_proved_where_the_base_model_has_no_dry_friction() -> None:
     assert law.fall.after < 1.2 < law.fall.before
 
 
+@pytest.mark.slow
 def test_a_place_that_holds_is_not_lost_to_one_that_helps_in_a_single_block(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -178,6 +182,7 @@ def test_a_place_that_holds_is_not_lost_to_one_that_helps_in_a_single_block(
     assert law.rival_places == ("law_of_friction_over_speed",)
 
 
+@pytest.mark.slow
 def test_where_held_out_blocks_do_not_confirm_the_best_place_the_next_is_tried(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -332,12 +337,14 @@ def test_friction_that_gives_energy_and_other_forms_are_no_term() -> None:
         assert "a law that nobody had listed" in machine_sentences.headline(finding)
 
 
+@pytest.mark.slow
 def test_a_law_that_would_give_energy_is_refused() -> None:
     finding = investigated(-3.6)
     assert finding.law is None
     assert "give energy" in finding.law_refused
 
 
+@pytest.mark.slow
 def test_law_is_a_base_model_again_and_leaves_nothing(tmp_path: Path) -> None:
     write(slide(0.6), tmp_path / "campaign")
     (tmp_path / "base.yaml").write_text(SLIDE_FILE, encoding="utf-8")
@@ -407,6 +414,7 @@ PENDULUM = BaseModel(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_swing_is_simulated_nearer_with_the_law_of_the_place_that_pushes(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -457,6 +465,7 @@ def test_faults_of_a_law_have_line_and_column(tmp_path: Path, changed: tuple[str
     assert said in str(caught.value)
 
 
+@pytest.mark.slow
 def test_findings_of_a_base_model_are_those_of_the_public_function(tmp_path: Path) -> None:
     (tmp_path / "base.yaml").write_text(SLIDE_FILE, encoding="utf-8")
     findings = impactcell.discrepancy(slide(0.6), base=tmp_path / "base.yaml")

@@ -22,6 +22,8 @@ from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.german.findings import REPORTS
 from impactcell.records import Capture, Channel
 
+pytestmark = pytest.mark.slow
+
 BASE = "{format: 1, coordinate: translation, excitation: free, mass_kg: 1.0, terms: [coulomb_friction]}"
 
 

@@ -10,6 +10,8 @@ from impactcell.discrepancy.machine import MachineFinding, investigate_machine
 from impactcell.records import Capture, Channel
 from tests.discrepancy.test_base_model import SEAL
 
+pytestmark = pytest.mark.slow
+
 COLUMN = "covariate_friction(pressure_bar)"
 SPEEDS = ((10.6e-3, 12.5e-3), (8.3e-3, 12.2e-3), (5.6e-3, 11.7e-3), (7.0e-3, 14.1e-3))
 """Out and back under 1, 3, 5 and 7 bar, as those of a real drive that is pressed against [m/s]."""

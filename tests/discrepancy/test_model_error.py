@@ -146,12 +146,14 @@ def _seen_by(shots: int, seed: int) -> float:
     return float(off / np.sqrt(variances(linearisation)[0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shots", [1, 2, 4, 40])
 def test_what_few_shots_tell_of_is_as_uncertain_as_their_noise(shots: int) -> None:
     ratios = np.array([_seen_by(shots, seed) for seed in range(400)])
     assert np.sqrt(np.mean(ratios**2)) == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.slow
 def test_an_effect_is_established_although_something_remains(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(study, "RATE_HZ", 2000.0)
     for later, idle in (("find_law", lambda *_: None), ("hold_against_free_forms", lambda _, found: found)):

@@ -147,6 +147,7 @@ def test_a_delay_of_more_than_a_sample_or_that_explains_less_is_no_rival() -> No
         assert told_from_number(search, [], steps, late_by(sample_s)) is steps
 
 
+@pytest.mark.slow
 def test_what_leaves_a_gap_is_not_tied_with_what_leaves_none() -> None:
     """Quadratic drag closes nine tenths of it, and leaves a gap that viscous friction does not."""
     knows_less = replace(AXIS, terms=AXIS.terms[:1])
@@ -157,6 +158,7 @@ def test_what_leaves_a_gap_is_not_tied_with_what_leaves_none() -> None:
     assert finding.fall.after < finding.expected[1]
 
 
+@pytest.mark.slow
 def test_a_period_is_found_between_the_points_of_its_grid() -> None:
     finding = investigate_machine(axis(lambda place, _: 0.2 * np.sin(2.0 * math.pi * place / 0.06)), AXIS)
     assert finding.established == ("periodic_force",)

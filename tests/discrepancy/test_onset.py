@@ -16,6 +16,8 @@ from impactcell.records import Capture
 from tests.discrepancy import study
 from tests.discrepancy.study import Job, campaign, logged, name_effects
 
+pytestmark = pytest.mark.slow
+
 JOB = Job("none", (), 5_060_000, shots=30)
 """With contact put where the force begins, good to a part of a step, this was a gap of 1.16 noise floors."""
 BEFORE = (20, 60)

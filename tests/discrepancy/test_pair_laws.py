@@ -47,6 +47,7 @@ def oil() -> DiscrepancyResult:
         return investigate(oil_campaign(8601, shots=SHOTS), seed=1, library=FEW)
 
 
+@pytest.mark.slow
 def test_drag_is_found_to_go_with_speed_and_column(oil: DiscrepancyResult) -> None:
     assert oil.law is not None
     assert oil.law.refused == ""
@@ -59,6 +60,7 @@ def test_drag_is_found_to_go_with_speed_and_column(oil: DiscrepancyResult) -> No
     assert oil.law.change.after.trace < 1.1 < 2.0 < oil.law.change.before.trace
 
 
+@pytest.mark.slow
 def test_it_is_written_with_both_ranges_and_named_from_then_on(
     oil: DiscrepancyResult, tmp_path: Path
 ) -> None:
@@ -101,6 +103,7 @@ def test_a_second_covariate_that_follows_the_first_is_none(noise: float, is_one:
     assert covariates._is_function_of(u, w + noise * w.std() * rng.standard_normal(3000)) is is_one
 
 
+@pytest.mark.slow
 def test_a_product_is_ranked_first_where_the_coefficients_are_a_products() -> None:
     """The quadratic likelihood of coefficients that are exactly known is told by least squares alone."""
     ends = ((0.0, 0.2), (15.0, 40.0))

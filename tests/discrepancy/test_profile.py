@@ -15,6 +15,8 @@ from impactcell.discrepancy.nominal_model import problem_of
 from tests.discrepancy import study
 from tests.discrepancy.test_convergence import context_of, fitted
 
+pytestmark = pytest.mark.slow
+
 HIDDEN = ("presliding_compliance", "force_sensor_lag")
 RATIO = 3
 """Column of mu_s/mu_k."""

@@ -59,6 +59,7 @@ def found(base: BaseModel, count: int, spread_n: float) -> MachineFinding:
     return investigate_machine(records(count, spread_n), base)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("response", [Response.POSITION, Response.FORCE])
 @pytest.mark.parametrize("count", [4, 9])
 def test_what_is_found_is_the_same_whatever_the_constants(response: Response, count: int) -> None:
@@ -76,6 +77,7 @@ def test_what_is_found_is_the_same_whatever_the_constants(response: Response, co
         assert one.rmse == pytest.approx(other.rmse, rel=0.01)
 
 
+@pytest.mark.slow
 def test_none_are_told_where_nothing_remains(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of nothing any constant takes all."""
     left = Remainder(math.nan, (), 0.0, 1.0)
@@ -87,6 +89,7 @@ def test_none_are_told_where_nothing_remains(monkeypatch: pytest.MonkeyPatch) ->
     assert not [note for note in finding.notes if "of what remains" in note]
 
 
+@pytest.mark.slow
 def test_a_base_model_without_them_says_that_they_are_missing() -> None:
     whole = replace(LACKING, terms=SLIDE.terms)
     blind = found(whole, 9, SPREAD_N)

@@ -46,6 +46,7 @@ def with_gaps(gaps: Sequence[Gap], channels: tuple[str, ...] = ("force", "positi
 EVERYWHERE = [(number, 0.7 + 1.9 * place, 0.25) for number in range(1, 5) for place in range(6)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gaps", [[(2, 4.0, 0.25)], [(2, 9.5, 0.25)], [(2, 4.0, 0.05)], EVERYWHERE])
 @pytest.mark.parametrize("response", Response)
 def test_a_gap_is_no_gap_of_the_model(gaps: list[Gap], response: Response) -> None:
@@ -58,6 +59,7 @@ def test_a_gap_is_no_gap_of_the_model(gaps: list[Gap], response: Response) -> No
     assert finding.simulated[-1].fit_percent > 80.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("channel", ["force", "position"])
 def test_a_gap_of_one_channel_is_one_of_the_record(channel: str) -> None:
     base = replace(SLIDE, delay_s=NumberPrior(0.0, 5e-3))

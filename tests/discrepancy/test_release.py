@@ -38,6 +38,7 @@ def lifted(shot: Capture) -> Capture:
     return replace(shot, position=Channel(time, angle, shot.position.noise_std))
 
 
+@pytest.mark.slow
 def test_drag_is_named_of_swings_that_a_hand_lifted() -> None:
     shots = swings(0.004)
     by_hand = investigate_machine(pendulum(tuple(map(lifted, shots))), BASE)

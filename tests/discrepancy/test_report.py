@@ -23,6 +23,8 @@ from impactcell.physics.effect_names import as_title
 from impactcell.physics.effects import LIBRARY
 from tests.discrepancy.test_workflow import investigated
 
+pytestmark = pytest.mark.slow
+
 SECTIONS = ["Where they disagree", "Held-out shots", "Evidence for every candidate", "Parameters"]
 VOID = {"meta", "br", "path", "use"}
 

@@ -12,6 +12,8 @@ from impactcell.discrepancy.report.german_notes import note
 from impactcell.records import Samples
 from tests.discrepancy.study import Job, campaign, name_effects
 
+pytestmark = pytest.mark.slow
+
 JOB = Job("none", (), 5_070_000, shots=30)
 
 

@@ -25,6 +25,8 @@ from impactcell.discrepancy.machine.weak_form import Rows, build_rows
 from impactcell.records import Capture, Channel, Samples
 from tests.discrepancy.stick_slip import sines
 
+pytestmark = pytest.mark.slow
+
 MASS_KG, VISCOUS_N_S_PER_M, RIPPLE_N, PERIOD_M, PHASE_RAD = 2.0, 4.0, 0.8, 0.15, 0.4
 RATE_HZ, SECONDS, RECORDS, STEPS = 250.0, 10.0, 8, 4
 RIPPLE = TermChoice("periodic_force")

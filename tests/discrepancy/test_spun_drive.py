@@ -67,6 +67,7 @@ def investigated(saturating: float, *, zero_is_free: bool = True) -> MachineFind
     return investigate_machine(campaign, base)
 
 
+@pytest.mark.slow
 def test_what_never_comes_back_has_blocks_enough_and_shows_its_inertia() -> None:
     finding = investigated(0.0)
     assert len(finding.training) > 5 * 8  # of eight records
@@ -103,6 +104,7 @@ def test_a_law_that_cancels_the_drive_is_none() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("zero_is_free", [True, False])
 def test_friction_that_saturates_is_found_over_the_speed(zero_is_free: bool) -> None:
     """Also where the zero of the torque is held, which is 99 % of what remains then."""

@@ -177,6 +177,7 @@ def test_rivals_that_know_no_ties_are_forgiven_the_exact_confound() -> None:
     assert judge.judged(generous(answered(given, []))) == "no_gap"
 
 
+@pytest.mark.slow
 def test_a_sparse_regression_names_the_terms_that_are_there() -> None:
     rng = np.random.default_rng(1)
     shots = []
@@ -190,6 +191,7 @@ def test_a_sparse_regression_names_the_terms_that_are_there() -> None:
     assert selected(shots) == ["viscous_friction"]
 
 
+@pytest.mark.slow
 def test_localised_discovery_certifies_the_term_that_is_there_and_controls_what_it_names_in_noise() -> None:
     rng = np.random.default_rng(3)
     names = [

@@ -51,6 +51,7 @@ def motor(raster: float = 0.0, stated: float | None = None, *, summed_up: bool =
     return Campaign(Excitation.DRIVEN, tuple(shots), coordinate=Coordinate.ROTATION)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("raster", [0.0, 0.1])
 def test_a_model_that_misses_nothing_leaves_no_gap(raster: float) -> None:
     finding = investigate_machine(motor(raster), MOTOR)
@@ -68,6 +69,7 @@ def test_a_model_that_misses_nothing_leaves_no_gap(raster: float) -> None:
     assert noise_keys(finding) == ["noise_std_n_m", "noise_std_rad_per_s"]
 
 
+@pytest.mark.slow
 def test_a_position_that_is_not_said_to_be_summed_up_has_a_false_gap() -> None:
     """What the mark is for: noise that adds up is a motion otherwise."""
     assert investigate_machine(motor(summed_up=False), MOTOR).fall.after > 10.0

@@ -20,6 +20,7 @@ LIBRARY = (
 """Effects that may be named here: fewer to try are faster."""
 
 
+@pytest.mark.slow
 def test_three_effects_are_named_each_with_what_it_closes_of_what_the_others_leave() -> None:
     hidden = ("viscous_friction", "restoring_force", "hertz_contact")
     found = name_effects(quick_campaign(Job("three", hidden, 3, shots=24)), library=LIBRARY)

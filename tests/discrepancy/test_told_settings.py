@@ -28,6 +28,8 @@ from simulator.campaign_scenario import CampaignScenario
 from tests.discrepancy import study
 from tests.discrepancy.study import Job, logged, name_effects, recorded, scenario
 
+pytestmark = pytest.mark.slow
+
 JOB = Job("none", (), 7_090_001, shots=30)
 LIBRARY = (
     "force_sensor_gain", "mass_error", "hertz_contact", "viscous_friction", "stiction_ageing",

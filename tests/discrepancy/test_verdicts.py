@@ -27,6 +27,8 @@ from tests.discrepancy import study
 from tests.discrepancy.study import name_effects
 from tests.discrepancy.test_workflow import investigated, make
 
+pytestmark = pytest.mark.slow
+
 
 def part_of_record(hidden: str, seconds: float) -> Campaign:
     """The first seconds of a driven record of which no noise is stated."""

@@ -33,6 +33,7 @@ def wrapped(shots: tuple[Capture, ...], least: float) -> tuple[Capture, ...]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drag", [0.0, 4e-4])
 def test_a_swing_about_the_zero_of_a_wrapping_sensor_is_the_swing_it_was(drag: float) -> None:
     """It had a gap of 50 000 noise floors, and a law that nobody had listed."""

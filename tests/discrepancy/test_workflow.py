@@ -53,6 +53,7 @@ def answer(found: DiscrepancyResult) -> tuple[str, set[str]]:
     return found.verdict, {*found.added, *tied}
 
 
+@pytest.mark.slow
 def test_nothing_is_named_where_nothing_is_hidden() -> None:
     found = investigate(make())
     assert found.verdict == "no_gap"
@@ -68,6 +69,7 @@ def test_a_library_of_which_no_shot_can_test_anything_names_nothing(library: tup
     assert (found.verdict, found.added) == ("no_gap", ())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effect", ["viscous_friction", "channel_skew", "position_sensor_lag", "friction_drift"]
 )
@@ -82,6 +84,7 @@ def test_a_hidden_effect_is_named_with_its_parameters(effect: str) -> None:
     assert found.validation.held_out.after.trace < 1.05
 
 
+@pytest.mark.slow
 def test_a_confound_that_is_lost_on_few_samples_is_tied_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     def without_mass(context: SearchContext, rough: list[Fit], given: Container[str]) -> list[Fit]:
         return [one for one in finalists(context, rough, given) if one.effects[-1] != "mass_error"]
@@ -202,6 +205,7 @@ def test_an_effect_of_no_library_is_unknown_and_nothing_is_listed() -> None:
     assert outcome["unexplained"]["phase"] in {"preload", "loading", "unloading"}
 
 
+@pytest.mark.slow
 def test_a_gap_between_shots_is_unknown_with_the_covariate_that_it_goes_with() -> None:
     others = ("friction_drift", "batch_shift", "viscous_friction", "hertz_contact", "friction_patch")
     found = study.name_effects(make("surface_tilt"), library=others)
@@ -280,6 +284,7 @@ def test_a_unit_that_is_wrong_is_told_with_the_campaign_that_has_it(tmp_path: Pa
         impactcell.discrepancy(path, train="1")
 
 
+@pytest.mark.slow
 def test_missing_channels_and_replicates_are_said() -> None:
     given = make(shots=24)
     jittered = [
@@ -293,6 +298,7 @@ def test_missing_channels_and_replicates_are_said() -> None:
     assert result_document(found)["gap"]["parts"]["train"]["before"]["friction_factors"] is None
 
 
+@pytest.mark.slow
 def test_replicate_spread_is_that_of_the_scatter() -> None:
     found = investigate(make(shots=60))
     rng = np.random.default_rng(2)

@@ -5,6 +5,8 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 NAME = re.compile(r"(?<!`)`([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)(?:\(\))?`(?!`)")
 """A name, or names joined by dots, in single backticks; other text there is code, a formula or a file."""
@@ -118,6 +120,7 @@ def unresolved(sources: dict[Path, str]) -> list[str]:
     )
 
 
+@pytest.mark.slow
 def test_backticked_names_are_there() -> None:
     sources = {
         path.relative_to(ROOT): path.read_text(encoding="utf-8")

@@ -17,6 +17,8 @@ from impactcell.quantities import CYCLE, HISTORY, MODULE
 from impactcell.settings import schema
 from tests.between_workers import computed_once
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).resolve().parents[2]
 
 

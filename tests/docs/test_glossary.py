@@ -27,6 +27,7 @@ def test_a_word_listed_twice_is_seen() -> None:
     assert twice_listed(["shot", "cycle", "Shot"]).items == ("shot",)
 
 
+@pytest.mark.slow
 def test_no_retired_name_is_left(product: list[_syntax.Module]) -> None:
     _, retired = glossary(ROOT)
     assert len(retired) > 40
@@ -40,6 +41,7 @@ def test_a_retired_name_is_seen(tmp_path: Path) -> None:
     assert len(seen.items) == 3
 
 
+@pytest.mark.slow
 def test_what_the_structure_table_looks_for_is_still_there(product: list[_syntax.Module]) -> None:
     for row, patterns in DEFINITIONS.items():
         assert definitions(product, patterns).value > 0, row

@@ -58,6 +58,7 @@ def test_a_page_names_files_that_are_there(page: Path) -> None:
     assert [name for name in MODULE.findall(text) if name not in LOGGERS and not exists(name)] == []
 
 
+@pytest.mark.slow
 def test_docstrings_name_what_is_there() -> None:
     gone = []
     for path in SOURCES:
@@ -68,6 +69,7 @@ def test_docstrings_name_what_is_there() -> None:
     assert gone == []
 
 
+@pytest.mark.slow
 def test_docstrings_use_no_retired_type() -> None:
     _, retired = glossary(ROOT)
     typed = re.compile(

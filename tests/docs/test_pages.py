@@ -30,6 +30,7 @@ def test_there_are_pages_with_code() -> None:
     assert {"notebook.md", "discrepancy.md", "start.md"} <= {page.name for page in PAGES}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_a_page_does_what_it_says(page: Path, workspace: Path) -> None:
     for block, printed in run(page, workspace):

@@ -26,6 +26,8 @@ from tests.integration.processes import CONFIG, simulator, write_cell
 from tests.integration.stepped import stepped
 from tests.integration.watched import serving
 
+pytestmark = pytest.mark.slow
+
 KINDS = ["empty", "constant_force", "saturated", "no_separation", "not_a_number", "no_force"]
 
 

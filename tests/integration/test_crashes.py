@@ -2,7 +2,11 @@
 
 from pathlib import Path
 
+import pytest
+
 from tests.integration.crashes import crash
+
+pytestmark = pytest.mark.slow
 
 
 async def test_ten_kills(tmp_path: Path) -> None:

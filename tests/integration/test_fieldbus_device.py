@@ -85,6 +85,7 @@ async def running(window: int = 16, timeout_s: float = 10.0) -> AsyncIterator[Ce
         yield Cell(server, device, module, receptions, truths)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("window", [1, 16])
 async def test_every_cycle_arrives_once_and_true(window: int) -> None:
     async with running(window) as cell:
@@ -97,6 +98,7 @@ async def test_every_cycle_arrives_once_and_true(window: int) -> None:
         assert cell.module.status.missed == 0
 
 
+@pytest.mark.slow
 async def test_every_cycle_arrives_once_and_true_whatever_befalls_the_link() -> None:
     async with running(timeout_s=0.1) as cell:
         for kind in FaultKind:

@@ -20,6 +20,8 @@ from tests.integration.processes import write_cell
 from tests.integration.watched import serving
 from tests.patience import COMPILING_S
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def older(tmp_path: Path) -> Path:

@@ -111,6 +111,7 @@ def _as(here: Site, alarm: Alarm) -> Alarm:
     return here.actions.alarms.get((CELL, alarm.name), alarm)
 
 
+@pytest.mark.slow
 async def test_an_event_id_stands_for_its_activation_however_much_came_after() -> None:
     async with site() as here, await here.client("operator") as client:
         events = await listening(here, client)
@@ -169,6 +170,7 @@ async def test_another_reason_of_a_standing_alarm_is_an_event_and_the_next_fault
         assert events.queue.empty()
 
 
+@pytest.mark.slow
 async def test_a_comment_that_is_no_utf_8_is_refused() -> None:
     """What a client sends in Latin-1 came through with half characters, which the journal cannot write."""
     latin = b"gr\xfc\xdfe".decode(errors="surrogateescape")  # the client sends these very bytes
@@ -201,6 +203,7 @@ async def test_a_comment_without_a_text_is_refused_and_changes_nothing() -> None
         assert await act(here, client, "Acknowledge", shown, "") == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("action", ["Acknowledge", "AddComment"])
 async def test_an_event_id_holds_over_a_restart(tmp_path: Path, action: str) -> None:
     """Not only the newest: a client that was offline acts on the event it has."""
@@ -217,6 +220,7 @@ async def test_an_event_id_holds_over_a_restart(tmp_path: Path, action: str) -> 
             assert await act(here, client, action, first) == 0
 
 
+@pytest.mark.slow
 async def test_the_history_tells_the_same_event_ids() -> None:
     async with site() as here, await here.client("operator") as client:
         events = await listening(here, client)

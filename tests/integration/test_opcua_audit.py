@@ -18,6 +18,7 @@ async def call(here: Site, user: str, owner: str, method: str, *arguments: ua.Va
         return (await client.uaclient.call([request]))[0].StatusCode.value
 
 
+@pytest.mark.slow
 async def test_commands_and_acknowledgements_are_audited(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, "impactcell.audit")
 

@@ -69,6 +69,7 @@ async def test_bad_beginnings() -> None:
         await alive(here)
 
 
+@pytest.mark.slow
 async def test_bad_requests_on_an_open_channel() -> None:
     async with site() as here:
         async with raw(here) as wire:
@@ -136,6 +137,7 @@ async def test_noise(seed: int) -> None:
         await alive(here)
 
 
+@pytest.mark.slow
 async def test_half_open_connections_are_closed_in_time() -> None:
     async with site(limits=ServerLimits(hello_s=0.5, activation_s=2.5)) as here:
         async with raw(here) as silent, raw(here) as stopped, raw(here) as idle:
@@ -166,6 +168,7 @@ async def test_too_many_connections() -> None:
             assert kind in {b"ACK", b"ERR"}
 
 
+@pytest.mark.slow
 async def test_a_thousand_connections_at_once() -> None:
     """Those beyond the limit are told so before any cryptography; a client that is in goes on."""
     async with site(limits=ServerLimits(connections=50, undisturbed_s=3600.0, **PATIENT)) as here:

@@ -41,6 +41,7 @@ async def here() -> AsyncIterator[Site]:
         yield running
 
 
+@pytest.mark.slow
 async def test_half_hellos_give_way_to_newcomers() -> None:
     """All places are held by connections that never say who they are: who wants to log in can."""
     async with (
@@ -56,6 +57,7 @@ async def test_half_hellos_give_way_to_newcomers() -> None:
                     await (await here.node(client, "Module/Connected")).read_data_value(False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bound", ["connections", "connections_per_address"])
 async def test_who_has_logged_in_does_not_give_way(bound: str) -> None:
     async with site(limits=ServerLimits(**{bound: 2}, undisturbed_s=0.0, **SLOW)) as here:
@@ -66,6 +68,7 @@ async def test_who_has_logged_in_does_not_give_way(bound: str) -> None:
                 await (await here.node(client, "Module/Connected")).read_data_value(False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("undisturbed_s", [0.0, 3600.0])
 async def test_sessions_that_nobody_logs_in_to_give_way(undisturbed_s: float) -> None:
     """All places are held by sessions without a user: who wants to log in can, but not at once."""
@@ -101,6 +104,7 @@ async def test_one_address_has_its_places_and_no_more() -> None:
             assert await wire.error() == codes.BadTcpServerTooBusy
 
 
+@pytest.mark.slow
 async def test_a_long_message_is_for_those_who_have_logged_in(here: Site) -> None:
     async with raw(here) as wire:
         channel, _ = await wire.channel()
@@ -111,6 +115,7 @@ async def test_a_long_message_is_for_those_who_have_logged_in(here: Site) -> Non
         assert await wire.error() == codes.BadTcpMessageTooLarge
 
 
+@pytest.mark.slow
 async def test_an_address_that_holds_too_many_unfinished_bytes(
     here: Site, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -125,6 +130,7 @@ async def test_an_address_that_holds_too_many_unfinished_bytes(
         assert await wires[1].error() == codes.BadTcpNotEnoughResources
 
 
+@pytest.mark.slow
 async def test_an_open_request_of_many_encrypted_blocks(here: Site) -> None:
     """Each block would be decrypted with the server's key, for whoever knows a trusted certificate."""
     policy = b"http://opcfoundation.org/UA/SecurityPolicy#Basic256Sha256"
@@ -139,6 +145,7 @@ async def test_an_open_request_of_many_encrypted_blocks(here: Site) -> None:
         assert await wire.error() == codes.BadTcpMessageTooLarge
 
 
+@pytest.mark.slow
 async def test_a_connection_that_has_ended_is_freed_at_once(
     here: Site, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -171,6 +178,7 @@ async def test_a_connection_that_has_ended_is_freed_at_once(
         gc.enable()
 
 
+@pytest.mark.slow
 async def test_one_user_cannot_hold_all_sessions(here: Site) -> None:
     async with await here.client() as first, await here.client() as second:
         third = await here.client()
@@ -182,6 +190,7 @@ async def test_one_user_cannot_hold_all_sessions(here: Site) -> None:
                 await (await here.node(client, "Module/Connected")).read_data_value(False)
 
 
+@pytest.mark.slow
 async def test_a_session_without_a_client_gives_way_to_one_of_the_same_user(here: Site) -> None:
     async with contextlib.AsyncExitStack() as stack:
         for _ in range(2):
@@ -210,6 +219,7 @@ def _connections(here: Site, user: str) -> list[TcpConnection]:
     return [s.connection for s in sessions if s.actor is not None and s.actor.user == user]
 
 
+@pytest.mark.slow
 async def test_the_name_of_a_session_is_short(here: Site) -> None:
     client = await here.client()
     client.description = client.name = "x" * 20_000
@@ -217,6 +227,7 @@ async def test_the_name_of_a_session_is_short(here: Site) -> None:
         assert all(len(session.name) <= 128 for session in here.server._host._sessions.all())
 
 
+@pytest.mark.slow
 async def test_acknowledgements_are_bounded(here: Site) -> None:
     async with await here.client() as client:
         await client.create_subscription(1000.0, _Silent())
@@ -227,6 +238,7 @@ async def test_acknowledgements_are_bounded(here: Site) -> None:
         assert refused.value.code == codes.BadTooManyOperations
 
 
+@pytest.mark.slow
 async def test_an_answer_to_browse_has_room_for_so_many_references(
     here: Site, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -268,6 +280,7 @@ async def browse_next(client: Client, points: list[bytes]) -> list[ua.BrowseResu
     return await client.uaclient.browse_next(parameters)
 
 
+@pytest.mark.slow
 async def test_monitored_items_are_bounded_for_a_user(here: Site) -> None:
     async with await here.client() as client, await here.client() as second:
         counts = []
@@ -280,6 +293,7 @@ async def test_monitored_items_are_bounded_for_a_user(here: Site) -> None:
             assert await created(other, subscription.subscription_id, await items(here, other, 40)) == 40
 
 
+@pytest.mark.slow
 async def test_event_items_are_bounded_for_a_user(here: Site) -> None:
     async with await here.client("engineer") as client:
         subscription = await client.create_subscription(1000.0, _Silent())
@@ -287,6 +301,7 @@ async def test_event_items_are_bounded_for_a_user(here: Site) -> None:
         assert await created(client, subscription.subscription_id, wanted) == 3
 
 
+@pytest.mark.slow
 async def test_queues_of_a_subscription_are_bounded_together(
     here: Site, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -342,6 +357,7 @@ async def created(client: Client, number: int, wanted: list[ua.MonitoredItemCrea
     return sum(result.StatusCode.is_good() for result in results)
 
 
+@pytest.mark.slow
 async def test_a_request_that_takes_long_to_decode_is_refused(here: Site) -> None:
     """Fifteen thousand empty strings: few bytes, and many of them to read."""
     request = ua.CreateSessionRequest()
@@ -354,6 +370,7 @@ async def test_a_request_that_takes_long_to_decode_is_refused(here: Site) -> Non
         assert struct.unpack("<I", answer[16 + 4 + 8 + 4 : 16 + 4 + 8 + 8])[0] == codes.BadDecodingError
 
 
+@pytest.mark.slow
 async def test_an_answer_that_would_be_too_long_is_refused(
     here: Site, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -407,6 +424,7 @@ async def _log_in_anew(here: Site, client: Client) -> ua.StatusCode:
     return ua.StatusCode(codes.Good)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("request_of", [_reset_wear, _read_history, _log_in_anew])
 async def test_a_long_request_that_waits_lets_those_of_others_pass(
     request_of: Callable[[Site, Client], Awaitable[ua.StatusCode]], monkeypatch: pytest.MonkeyPatch

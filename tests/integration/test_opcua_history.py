@@ -20,6 +20,8 @@ from impactcell.scada import HistoryRequest, HistoryValue, ValuePage
 from tests.opcua_server import CELL, START_NS, MemoryHistory, Site, site
 from tests.snapshots import make_capture, make_snapshot
 
+pytestmark = pytest.mark.slow
+
 SECOND_NS = 10**9
 COUNT = 25
 VARIABLE = "Friction/StaticFriction"

@@ -21,6 +21,8 @@ from impactcell.scada.users import User, read_users, write_users
 from tests.opcua_server import CLIENT_URI, PASSWORDS, PatientClient, Site, site
 from tests.patience import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 codes = ua.StatusCodes
 
 

@@ -35,6 +35,7 @@ async def attribute(here: Site, client: Client, path: str, attribute_id: ua.Attr
     return (await node.read_attribute(attribute_id)).Value.Value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("locale_ids", "locale", "text"),
     [
@@ -54,6 +55,7 @@ async def test_the_first_language_that_is_spoken(
         assert (name.Locale, name.Text) == (locale, text)
 
 
+@pytest.mark.slow
 async def test_two_sessions_two_languages(here: Site) -> None:
     async with await speaking(here, "de") as german, await speaking(here, "en") as english:
         state = "WearLimit/EnabledState"
@@ -72,6 +74,7 @@ async def test_two_sessions_two_languages(here: Site) -> None:
         assert found[1]["StartBatch"] == "StartBatch"
 
 
+@pytest.mark.slow
 async def test_the_languages_are_listed(here: Site) -> None:
     async with await here.client() as client:
         node = client.get_node(ua.ObjectIds.Server_ServerCapabilities_LocaleIdArray)
@@ -90,6 +93,7 @@ class Heard:
         self.values.put_nowait(value)
 
 
+@pytest.mark.slow
 async def test_alarms_are_told_in_the_language_of_the_listener(here: Site) -> None:
     message = "Die Oberfläche ist verschlissen."
     async with await speaking(here, "de") as german, await speaking(here, "en") as english:
@@ -110,6 +114,7 @@ async def test_alarms_are_told_in_the_language_of_the_listener(here: Site) -> No
         assert [(await h.values.get()).Text for h in heard] == ["Aktiv", "Active"]
 
 
+@pytest.mark.slow
 async def test_the_past_is_told_in_the_language_of_who_asks(here: Site) -> None:
     here.history.transitions[CELL] = [
         Alarm(
@@ -134,6 +139,7 @@ async def test_the_past_is_told_in_the_language_of_who_asks(here: Site) -> None:
         assert (text.Locale, text.Text) == ("de", "Verschlissen.")
 
 
+@pytest.mark.slow
 async def test_every_name_and_description_of_a_cell_is_there_in_german(here: Site) -> None:
     """Names of the nodes of a cell, of its types' methods, and all that says what they are; none is empty."""
     missing, empty = set(), set()

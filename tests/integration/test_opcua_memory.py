@@ -8,10 +8,14 @@ import sys
 from asyncio.subprocess import PIPE, Process
 from collections.abc import AsyncIterator
 
+import pytest
+
 from impactcell.opcua.connection_table import MAX_UNFINISHED_BYTES_PER_ADDRESS
 from impactcell.opcua.tcp_connection import MAX_QUEUED_BYTES
 from tests.integration.processes import ROOT
 from tests.opcua_wire import Raw, frame
+
+pytestmark = pytest.mark.slow
 
 CONNECTIONS = 24
 UNFINISHED = 56

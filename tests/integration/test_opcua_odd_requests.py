@@ -11,6 +11,8 @@ from tests.opcua_server import CELL, site
 from tests.opcua_wire import alive
 from tests.patience import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 REQUESTS = 700
 """A fault in one place of one service is met by one in thousands: longer runs try more of them."""
 OURS = {"BadInternalError", "BadUnexpectedError", "BadEncodingError", "BadDecodingError"}

@@ -13,6 +13,8 @@ from impactcell.scada.rights import MATRIX, Area, allowed
 from tests.opcua_server import CELL, START_NS, Site, site
 from tests.patience import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 REFUSED = {ua.StatusCodes.BadUserAccessDenied}
 
 

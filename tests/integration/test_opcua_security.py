@@ -22,6 +22,8 @@ from tests.certificates import self_signed
 from tests.opcua_server import CLIENT_URI, PASSWORDS, PATIENT, SERVER_URI, PatientClient, Site, site
 from tests.patience import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 codes = ua.StatusCodes
 
 

@@ -322,6 +322,7 @@ async def end_session(here: Site, _client: Client, size: int) -> None:
             await _subscribed(other, size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "ask",
     [

@@ -91,6 +91,7 @@ class Changes:
         return await asyncio.wait_for(self.queue.get(), PATIENCE_S)
 
 
+@pytest.mark.slow
 async def test_the_interface_is_there_with_units_and_descriptions() -> None:
     published = {folder: set[str]() for folder in FOLDERS}
     for quantity in (*CYCLE, *MODULE):
@@ -315,6 +316,7 @@ async def test_a_deadband_that_cannot_be_is_refused() -> None:
             assert await outcome(kind, value, "Friction/StaticFriction") == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("whole_subscription", [False, True])
 async def test_an_item_on_an_object_ends_like_any_other(
     caplog: pytest.LogCaptureFixture, *, whole_subscription: bool
@@ -395,6 +397,7 @@ async def test_a_full_queue_says_so() -> None:
         assert told[1].StatusCode.value == 0
 
 
+@pytest.mark.slow
 async def test_node_ids_stay_over_restarts_and_new_cells(tmp_path: Path) -> None:
     async def ids(cells: tuple[str, ...]) -> dict[str, str]:
         async with site(cells=cells, directory=tmp_path) as here, await here.client() as client:
@@ -413,6 +416,7 @@ async def test_node_ids_stay_over_restarts_and_new_cells(tmp_path: Path) -> None
     assert await ids(("another", CELL)) == before
 
 
+@pytest.mark.slow
 async def test_conditions_stay_over_a_restart(tmp_path: Path) -> None:
     async with site(directory=tmp_path) as here:
         stored = here.raise_alarm()

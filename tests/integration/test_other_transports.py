@@ -14,6 +14,8 @@ from tests.integration.processes import simulator, truths, write_cell
 from tests.integration.test_probe import probed
 from tests.patience import COMPILING_S
 
+pytestmark = pytest.mark.slow
+
 DECIMATED = {
     "force": {"rate_hz": 20_000, "noise_std": 0.4, "longest_s": 0.02},
     "position": {"rate_hz": 2_000, "noise_std": 1.5e-6, "longest_s": 0.2},

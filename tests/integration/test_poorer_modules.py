@@ -18,6 +18,8 @@ from tests.integration.test_probe import probed
 from tests.integration.test_running_cell import engineer, node
 from tests.patience import COMPILING_S
 
+pytestmark = pytest.mark.slow
+
 CYCLES = 8
 LOGGER = {
     "force": {"rate_hz": 50_000, "noise_std": 0.4, "longest_s": 0.16},

@@ -13,6 +13,8 @@ from tests.integration.processes import simulator, told, write_cell
 from tests.integration.watched import Watched, serving
 from tests.patience import COMPILING_S
 
+pytestmark = pytest.mark.slow
+
 TASKS = [
     {"target_m": 0.008, "mass_kg": 12.0},
     {"target_m": 0.015, "mass_kg": 30.0},

@@ -21,6 +21,7 @@ async def probed(cell: Path) -> tuple[int | None, str, str]:
     return code, out.decode(), "".join(f"{line}\n" for line in process.lines)
 
 
+@pytest.mark.slow
 async def test_identity_status_and_one_tap_are_shown(tmp_path: Path) -> None:
     strikes = {"period_s": 0.1, "cycles": 20, "velocities_mm_per_min": [4200.0]}
     async with simulator(tmp_path, strikes=strikes) as module:

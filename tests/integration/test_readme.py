@@ -119,6 +119,7 @@ def test_every_link_leads_somewhere() -> None:
         assert (ROOT / target).exists(), target
 
 
+@pytest.mark.slow
 def test_the_demo_sums_up(checkout: Path) -> None:
     # As from a shell: a make within a make would add lines of its own.
     plain = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")}

@@ -9,6 +9,8 @@ from tests.integration.processes import write_cell
 from tests.integration.stepped import stepped
 from tests.integration.watched import serving
 
+pytestmark = pytest.mark.slow
+
 
 def stored(directory: Path) -> list[tuple[int, int]]:
     with Journal(directory / "press-1.sqlite", "press-1", read_only=True) as journal:

@@ -13,6 +13,8 @@ from tests.integration.processes import simulator, started, truths, write_cell
 from tests.opcua_server import PatientClient
 from tests.patience import COMPILING_S, PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 CYCLES = 12
 
 

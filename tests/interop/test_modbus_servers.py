@@ -112,6 +112,7 @@ async def test_pymodbus_server_that_goes_away() -> None:
             await client.read(0, 10)
 
 
+@pytest.mark.slow
 async def test_what_pymodbus_server_can_have_in_flight_is_found_and_its_registers_are_right() -> None:
     async with pymodbus_server() as port, connected(port, None) as client:
         await client.find_window(100, 20_000)

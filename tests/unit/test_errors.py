@@ -5,6 +5,8 @@ import inspect
 import re
 from pathlib import Path
 
+import pytest
+
 from impactcell import errors
 
 
@@ -19,6 +21,7 @@ def test_docstring_draws_every_class() -> None:
     assert classes == drawn
 
 
+@pytest.mark.slow
 def test_docstring_names_what_stands_outside_the_tree() -> None:
     _, _, outside = (errors.__doc__ or "").partition("Outside the tree")
     package = Path(errors.__file__).parent

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import impactcell
 from impactcell.alarms import rules
 from impactcell.scada.german import GERMAN
@@ -72,6 +74,7 @@ def run(tree: Path, *arguments: str) -> None:
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_a_rule_is_one_file(tmp_path: Path) -> None:
     for package in ("impactcell", "tests"):
         # Machine code comes along: what is not changed is not compiled anew.

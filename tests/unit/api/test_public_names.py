@@ -64,6 +64,7 @@ def test_importing_it_loads_nothing_heavy() -> None:
     assert not any(name.startswith("impactcell.") for name in loaded)
 
 
+@pytest.mark.slow
 def test_the_function_and_the_room_of_one_name_do_not_shadow_each_other() -> None:
     # whichever is asked for first, each in a process of its own that has the libraries loaded
     code = """

@@ -122,6 +122,7 @@ def test_a_limit_is_one_number(limit: list[float]) -> None:
         impactcell.track([1, 2], [0.2, 0.2], limit=limit)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_batches_that_a_table_leaves_out_are_none() -> None:
     def tracked(*names: object) -> impactcell.TrackedSeries:
         batch = [name for name in names for _ in range(50)]

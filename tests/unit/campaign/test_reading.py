@@ -99,6 +99,7 @@ def test_start_position_and_covariates_are_kept(tmp_path: Path) -> None:
     assert got.shots[1].covariates["temperature_c"] == 22.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("header", "line", "message"),
     [
@@ -317,6 +318,7 @@ def test_reads_the_recorded_campaigns(shared_data: Path, name: str, shots: int) 
     np.testing.assert_array_equal(first.time_s, expected["time_s"])
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(body=st.text(alphabet="0123456789.,-+einfa_ \n\r\tx", max_size=60), width=st.integers(1, 3))
 def test_any_trace_is_read_or_refused(
@@ -335,6 +337,7 @@ def test_any_trace_is_read_or_refused(
             assert (np.diff(channel.time_s) > 0).all()
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(text=st.text(max_size=80))
 def test_any_header_or_table_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:

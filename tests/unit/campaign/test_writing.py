@@ -47,6 +47,7 @@ def same(left: Channel | None, right: Channel | None) -> bool:
     return bool((left.time_s == right.time_s).all() and (left.values == right.values).all())
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(data=st.data(), count=st.integers(1, 4))
 def test_round_trip(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject, count: int) -> None:

@@ -14,6 +14,8 @@ from impactcell.tracking.wear_batch import BatchKnowledge
 from tests.integration.processes import CONFIG
 from tests.taps import Tap
 
+pytestmark = pytest.mark.slow
+
 SECOND = 10**9
 AT = 44
 """First cycle after a change."""

@@ -16,6 +16,8 @@ from impactcell.tracking.wear_batch import BatchKnowledge
 from tests.integration.processes import CONFIG
 from tests.taps import VISCOUS, Tap
 
+pytestmark = pytest.mark.slow
+
 STRIBECK: dict[str, Any] = {
     "stribeck_friction": {"friction_increase": 0.05, "stribeck_velocity_m_s": 0.04},
 }

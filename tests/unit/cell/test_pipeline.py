@@ -41,6 +41,7 @@ def deviant_cycles(design: CellDesign, seed: int, cycles: int) -> list[int]:
     return deviant
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_an_effect_that_the_model_knows_makes_no_cycle_deviant(seed: int) -> None:
     design = cell_design(read_cell(CONFIG / "cells" / "new-effect.yaml"))

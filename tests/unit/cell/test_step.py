@@ -18,6 +18,8 @@ from impactcell.settings import read_cell
 from tests.integration.processes import CONFIG
 from tests.taps import Tap
 
+pytestmark = pytest.mark.slow
+
 SECOND = 10**9
 LEARNED = 12
 

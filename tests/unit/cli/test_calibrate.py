@@ -11,6 +11,7 @@ from impactcell.settings.model_file import read_model
 CONFIG = Path(__file__).resolve().parents[3] / "config"
 
 
+@pytest.mark.slow
 def test_the_prototype_is_calibrated_to_the_byte(tmp_path: Path) -> None:
     first, second = tmp_path / "a.yaml", tmp_path / "b.yaml"
     command.calibrate(CONFIG / "cells" / "prototype.yaml", first)

@@ -337,6 +337,7 @@ def test_what_cannot_be_used_is_named(tmp_path: Path) -> None:
         estimate(campaign(tmp_path / "d", bare, sensors={"position": SENSORS["position"]}))
 
 
+@pytest.mark.slow
 @pytest.mark.shared_data
 @pytest.mark.parametrize(("name", "most"), [("no-effect", 0.01), ("one-effect", 0.03)])
 def test_the_sample_campaigns(name: str, most: float, shared_data: Path, tmp_path: Path) -> None:
@@ -421,6 +422,7 @@ def test_traces_sampled_without_pause_or_stated_without_noise_are_no_traceback(t
         estimate(tmp_path / "quick")
 
 
+@pytest.mark.slow
 def test_rows_replace_a_file_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     write(
         Campaign(Excitation.TAP, tuple(captures(taps())), 9.81, 1.5e-3, SENSORS, COVARIATES), tmp_path / "c"

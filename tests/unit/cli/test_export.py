@@ -82,6 +82,7 @@ exec "$@"
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log", [False, True])
 def test_a_read_only_medium(tmp_path: Path, log: bool) -> None:
     place, copy = tmp_path / "place", tmp_path / "place" / "copy"

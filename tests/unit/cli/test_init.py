@@ -111,6 +111,7 @@ def test_a_map_with_a_fault_is_told_by_its_own_name_and_nothing_is_written(tmp_p
     assert [path.name for path in tmp_path.iterdir()] == ["own-map.yaml"]
 
 
+@pytest.mark.slow
 def test_a_cell_from_nothing_can_be_read_and_says_what_to_do(
     begun: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -131,6 +132,7 @@ def test_a_cell_from_nothing_can_be_read_and_says_what_to_do(
         run_verb(["init", str(begun), *ANSWERS])
 
 
+@pytest.mark.slow
 def test_a_map_may_be_called_like_the_cell(
     begun: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -144,6 +146,7 @@ def test_a_map_may_be_called_like_the_cell(
     assert "users.yaml NAME --role engineer" in capsys.readouterr().out, "the next steps run as they stand"
 
 
+@pytest.mark.slow
 def test_a_model_that_does_not_fit_the_cell_is_told_when_it_is_accepted(
     begun: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -166,6 +169,7 @@ def test_a_stroke_that_catches_up_with_the_part_is_told_with_the_way_out(
         calibration.calibrate(Plant(4e5, 300.0, 0.28, 0.2166), tap, [12.0], speeds, frictions)
 
 
+@pytest.mark.slow
 def test_further_taps_are_taken_where_the_first_are_not_good_enough(
     begun: Path, shots: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -225,6 +229,7 @@ def test_a_map_that_says_otherwise_is_named_and_another_map_is_not_taken_for_it(
         run_verb(["init", *answers])
 
 
+@pytest.mark.slow
 def test_the_first_model_is_that_of_the_plant(
     shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -245,6 +250,7 @@ def test_a_host_that_is_more_than_an_address_is_refused_before_anything_is_writt
     assert not (tmp_path / "d").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("campaign", [False, True])
 def test_the_noise_of_the_sensors_is_what_was_said_or_what_the_taps_show(
     begun: Path, shots: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, campaign: bool
@@ -265,6 +271,7 @@ def test_the_noise_of_the_sensors_is_what_was_said_or_what_the_taps_show(
             run_verb(["init", str(tmp_path / "d"), *ANSWERS, "--force-noise-n", wrong])
 
 
+@pytest.mark.slow
 def test_more_noise_in_the_taps_than_was_said_is_told(
     begun: Path, shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -288,6 +295,7 @@ def test_more_noise_in_the_taps_than_was_said_is_told(
     assert "0.4 N is taken, a guess; the first taps of its journal show 0.4" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_model_that_takes_the_place_of_a_provisional_one_says_so_until_another_does(
     begun: Path, tmp_path: Path
 ) -> None:
@@ -306,6 +314,7 @@ def test_a_model_that_takes_the_place_of_a_provisional_one_says_so_until_another
     assert in_place_of(fitted, other) is other
 
 
+@pytest.mark.slow
 def test_the_first_taps_of_the_journal_make_the_model(
     begun: Path, shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -469,6 +478,7 @@ def test_faults_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert all(fault["file"] == str(tmp_path / "cell.yaml") for fault in faults)
 
 
+@pytest.mark.slow
 def test_friction_as_json(shots: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run("estimate", shots, "--json")
     rows = json.loads(capsys.readouterr().out)

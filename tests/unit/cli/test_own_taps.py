@@ -27,6 +27,8 @@ from tests.integration.processes import CONFIG
 from tests.snapshots import make_snapshot
 from tests.taps import Tap
 
+pytestmark = pytest.mark.slow
+
 CELL = """
 format: 1
 cell: own

@@ -54,6 +54,7 @@ def test_slope_and_shift_of_a_known_series(tmp_path, capsys, batch):
     assert abs(shift["size"] - 0.006) < 3.0 * shift["size_std"]
 
 
+@pytest.mark.slow
 def test_people_read_two_standard_deviations_and_data_hold_one(tmp_path, capsys):
     path = write(tmp_path / "s.csv", truth())
     data = run(capsys, path)
@@ -66,6 +67,7 @@ def test_people_read_two_standard_deviations_and_data_hold_one(tmp_path, capsys)
     assert text.count("95 %") == 1
 
 
+@pytest.mark.slow
 def test_the_wear_limit(tmp_path, capsys):
     mu_s = truth(4000, slope=5e-6, step=0.0)
     found = run(capsys, write(tmp_path / "s.csv", mu_s), limit=0.21)
@@ -160,6 +162,7 @@ def test_missing_stds_missing_cycles_and_missing_values(tmp_path, capsys):
     assert found["notes"] == [{"cycle": int(kept[49]), "note": "mu_s is missing, the cycle is not used"}]
 
 
+@pytest.mark.slow
 def test_the_text_says_what_friction_is_by_now(tmp_path, capsys):
     """The level is that of the first batch, which after a shift nobody measures any more."""
     path = write(tmp_path / "s.csv", truth())
@@ -392,6 +395,7 @@ def test_a_counter_that_begins_anew_and_a_late_cycle_are_in_order(tmp_path, caps
     assert found["cycles"] == len(cycles)
 
 
+@pytest.mark.slow
 def test_one_wrong_number_is_told_and_moves_neither_wear_nor_alarms(tmp_path, capsys):
     cycles = np.arange(600)
     values = 0.2 + 2e-5 * cycles + STD * np.random.default_rng(304).normal(size=600)
@@ -422,6 +426,7 @@ def test_values_that_are_rounded_too_coarsely_are_told_what_they_need(tmp_path, 
     assert notes == {f"not used: a sensor is stuck, {told}"}
 
 
+@pytest.mark.slow
 def test_of_several_rates_the_one_in_force_is_shown(tmp_path, capsys):
     """A surface that runs in: its first change of rate says nothing of what it does now."""
     cycles = np.arange(800)

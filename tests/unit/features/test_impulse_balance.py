@@ -67,6 +67,7 @@ def test_no_right_tap_is_doubted(stroke_m: float, ratio: float) -> None:
     assert judged > 6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["force", "position", "backward", "rates"])
 def test_a_first_model_says_what_cannot_be_before_it_asks_for_more_taps(what: str) -> None:
     draw = np.random.default_rng(6)

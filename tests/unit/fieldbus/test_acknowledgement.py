@@ -110,6 +110,7 @@ class Refusing(ScriptedDevice):
         super().write(address, words, table)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "refuses", [NotImplementedError, LookupError, ValueError, BlockingIOError, ConnectionError]
 )

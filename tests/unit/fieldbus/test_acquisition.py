@@ -89,6 +89,7 @@ async def take(receptions: AsyncIterator[ReceivedCycle], count: int) -> list[Rec
     return [await anext(receptions) for _ in range(count)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("window", "max_registers"), [(1, 125), (16, 125), (4, 33), (2, 1)])
 async def test_a_cycle_arrives_whole_in_si(fpga: RegisterMap, window: int, max_registers: int) -> None:
     device = ScriptedDevice(fpga, session=9)
@@ -523,6 +524,7 @@ async def test_every_fault_ends_with_every_cycle_whole_and_in_order(
         assert (module.status.missed, module.status.unreadable) == (0, 0)
 
 
+@pytest.mark.slow
 async def test_a_module_that_makes_cycles_faster_than_they_can_be_read_is_followed(fpga: RegisterMap) -> None:
     """Every look at the force makes three more cycles: most are lost, counted, and none is mixed."""
     device = ScriptedDevice(fpga)

@@ -181,6 +181,7 @@ def test_the_cycle_for_which_a_counter_shows_0_has_its_neighbours_beside_it(
     assert sorted(cycle for cycle in status.ring if cycle) == list(range(number - held + 1, number + 1))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "before"), [("u16", 40_000), ("u16", 70_000), ("bcd16", 6_000)])
 async def test_a_small_controller_that_was_started_anew_has_lost_no_thousands(kind: str, before: int) -> None:
     layout = with_kind(SUMMARY, "cycle_counter", kind)

@@ -32,6 +32,7 @@ def assert_sound(channel: Channel | None) -> None:
     assert (np.diff(channel.time_s) > 0.0).all()
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(data=st.data())
 def test_arbitrary_window_words_become_a_sound_capture(fpga: RegisterMap, data: st.DataObject) -> None:

@@ -265,6 +265,7 @@ async def test_a_host_that_is_no_name_is_no_connection(kind: str, host: str, tmp
     await client.close()
 
 
+@pytest.mark.slow
 @every
 @pytest.mark.parametrize("seed", range(2))
 async def test_no_fault_gets_a_wrong_value_through(kind: str, seed: int, tmp_path: Path) -> None:

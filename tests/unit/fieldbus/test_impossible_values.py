@@ -127,6 +127,7 @@ async def stalled(device: ScriptedDevice, layout: RegisterMap, caplog: pytest.Lo
     return told
 
 
+@pytest.mark.slow
 async def test_a_ring_that_never_holds_what_is_counted_is_told_once(
     fpga: RegisterMap, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -139,6 +140,7 @@ async def test_a_ring_that_never_holds_what_is_counted_is_told_once(
     assert told.endswith("are right in map fpga-v1")
 
 
+@pytest.mark.slow
 async def test_a_buffer_that_never_shows_what_is_counted_is_told_once(
     caplog: pytest.LogCaptureFixture,
 ) -> None:

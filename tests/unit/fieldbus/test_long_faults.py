@@ -160,6 +160,7 @@ async def test_a_cycle_that_the_link_never_carries_is_given_up_before_it_costs_o
         assert (module.status.unreadable, module.status.missed) == (1, 0)
 
 
+@pytest.mark.slow
 async def test_what_is_read_anew_after_each_fault_gets_no_further(fpga: RegisterMap) -> None:
     """Without a CRC nothing is kept of a reading that was interrupted, however far it came."""
     registers = {name: register for name, register in fpga.registers.items() if name != "capture_crc32"}

@@ -125,6 +125,7 @@ ENTRY = st.dictionaries(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @given(st.dictionaries(st.text(max_size=5), st.one_of(ENTRY, st.integers(), st.none()), max_size=4))
 @settings(max_examples=400)
 def test_any_map_is_registers_or_faults(registers: dict[str, Any]) -> None:

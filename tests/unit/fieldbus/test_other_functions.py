@@ -130,6 +130,7 @@ async def test_a_faulty_identification_closes_the_link_as_any_other_reply(
         assert (await client.identification())["vendor"] == "Works"
 
 
+@pytest.mark.slow
 @every
 async def test_no_fault_gets_a_wrong_bit_or_name_through(kind: str, tmp_path: Path) -> None:
     faults, draw = FaultInjector(5), np.random.default_rng(5)
@@ -284,6 +285,7 @@ def test_an_echo_of_another_change_is_refused() -> None:
         check_reply(coil, bytes.fromhex("0500040000"))
 
 
+@pytest.mark.slow
 @given(st.sampled_from([1, 2, 3, 4, 5, 6, 15, 16, 22, 23, 43]), st.binary(max_size=40))
 @settings(max_examples=400)
 def test_the_simulator_answers_any_request_or_refuses_it(function: int, tail: bytes) -> None:

@@ -171,6 +171,7 @@ def layouts(draw: st.DrawFn) -> dict[str, Any]:
     return content
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(content=layouts(), max_registers=st.sampled_from([125, 40]))
 async def test_any_layout_that_is_taken_gives_right_cycles(
@@ -200,6 +201,7 @@ async def test_any_layout_that_is_taken_gives_right_cycles(
         assert module.status.unreadable == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("layout", [SUMMARY, ONE_BUFFER], ids=["summary", "one-buffer"])
 def test_faults_of_every_kind_give_nothing_wrong_twice_or_untold(layout: RegisterMap, seed: int) -> None:

@@ -125,6 +125,7 @@ async def test_a_wrong_bit_in_a_status_block_makes_no_cycle_come_twice_or_missin
     assert received == [CycleId(7, cycle) for cycle in range(1, 61)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("register", ["session", "cycle_counter"])
 async def test_a_status_register_with_a_bit_that_stays_wrong_makes_up_no_cycle(
     layout: RegisterMap, register: str
@@ -247,6 +248,7 @@ async def test_a_part_that_moves_does_not_keep_the_status_block_from_being_read(
         assert positioning.position_m == pytest.approx(1e-9 * mangler.polls)
 
 
+@pytest.mark.slow
 async def test_an_old_status_block_after_a_restart_is_no_restart_back(layout: RegisterMap) -> None:
     """It is of the session before, and what it tells of has gone: the slots that it names are empty now."""
     device = ScriptedDevice(layout, session=7)

@@ -98,6 +98,7 @@ async def test_a_module_that_has_made_no_cycle_yet_is_judged_by_its_first(layout
         await asyncio.gather(coming, return_exceptions=True)
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(
     session=st.integers(0, 2**32 - 1),

@@ -26,6 +26,7 @@ def flipping(device: ScriptedDevice, address: int, bit: int, times: int) -> list
     return seen
 
 
+@pytest.mark.slow
 async def test_every_bit_of_the_header_wrong_once(fpga: RegisterMap) -> None:
     device = ScriptedDevice(fpga)
     first, end = fpga["window_sequence"].address, fpga.header()[-1].end

@@ -9,6 +9,8 @@ from matplotlib.figure import Figure
 from impactcell.figures import diagnostics
 from impactcell.figures._style import STYLE
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("make", [diagnostics.over_batches, diagnostics.along_stroke])
 def test_a_legend_hides_nothing(make: Callable[[Figure], None]) -> None:

@@ -8,6 +8,8 @@ import pytest
 
 from impactcell.figures import friction
 
+pytestmark = pytest.mark.slow
+
 
 def test_three_figures_in_two_formats(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mpl.use("Agg")

@@ -9,6 +9,8 @@ from matplotlib.figure import Figure
 from impactcell.figures import diagnostics, friction, positioning
 from impactcell.figures._style import COLOURS, STYLE
 
+pytestmark = pytest.mark.slow
+
 AS_PRINTED = 200
 """Points of the curves that go through the marks of figure 3, which tell them apart."""
 

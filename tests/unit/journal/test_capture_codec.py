@@ -38,6 +38,7 @@ def channels(draw: st.DrawFn) -> Channel:
     )
 
 
+@pytest.mark.slow
 @given(
     st.none() | channels(),
     st.none() | channels(),
@@ -84,6 +85,7 @@ def test_same_bits_come_back(
     assert np.isnan(back.mass_kg)
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.integers(-(2**27), 2**27) | st.integers(-300, 300), max_size=3 * BLOCK),
     st.sampled_from([1e-9, 0.02, 0.025, 1.0]),

@@ -18,6 +18,8 @@ from impactcell.records import Alarm, CycleId
 from tests.snapshots import make_capture, make_snapshot
 from tests.unit.journal.lossy_disk import Recording, Step, disk_after_cut, recorded
 
+pytestmark = pytest.mark.slow
+
 CUTS = 200
 LIVES, CYCLES = 3, 12
 """Times that the journal is opened, and cycles in each."""

@@ -4,6 +4,8 @@ import sqlite3
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.retention import ROW_BYTES, SHARE, Retention
@@ -49,6 +51,7 @@ def pruned(journal: Journal, keep: Retention, active_ns: tuple[int, ...] = ()) -
         pass
 
 
+@pytest.mark.slow
 def test_alarms_that_come_and_go_push_out_no_cycle(tmp_path: Path) -> None:
     with filled(tmp_path / "j", 100) as journal:
         for burst in range(60):

@@ -123,6 +123,7 @@ def test_reading_alone_changes_nothing(older: Path) -> None:
     assert version(older) == 3
 
 
+@pytest.mark.slow
 def test_killed_at_any_statement_it_is_as_it_was_or_as_it_will_be(tmp_path: Path, older: Path) -> None:
     images = tmp_path / "killed"
     images.mkdir()

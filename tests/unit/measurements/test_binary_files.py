@@ -100,6 +100,7 @@ def arrays(count: int, seed: int = 0, dtype: str = "float64") -> Arrays:
     }
 
 
+@pytest.mark.slow
 @every
 @given(
     count=st.integers(2, 300),
@@ -203,6 +204,7 @@ def bomb(size: int) -> bytes:
     return zlib.compress(b"\0" * size, 9)
 
 
+@pytest.mark.slow
 def test_bombs_are_refused_without_being_unpacked(tmp_path: Path) -> None:
     small = Limits(unpacked_bytes=20_000_000)
     zipped = io.BytesIO()

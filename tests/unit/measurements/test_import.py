@@ -53,6 +53,7 @@ def table(**columns: tuple[str | None, np.ndarray]) -> Table:
     )
 
 
+@pytest.mark.slow
 def test_a_loggers_files_become_taps_with_the_right_friction(files: list[Path], tmp_path: Path) -> None:
     tables = read(files)
     imported = write_campaign(tables, guess(tables), tmp_path / "campaign")
@@ -230,6 +231,7 @@ def test_what_is_given_goes_before_what_is_guessed() -> None:
     assert make_campaign(tables, mapping).campaign.excitation is Excitation.DRIVEN
 
 
+@pytest.mark.slow
 def test_the_verb_shows_what_it_guessed_and_writes(
     files: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -266,6 +268,7 @@ def test_the_verb_shows_what_it_guessed_and_writes(
         run_verb(["import", *named])
 
 
+@pytest.mark.slow
 def test_a_file_with_the_samples_of_another_is_told_and_kept(files: list[Path]) -> None:
     copy = files[1].with_name(f"{files[1].stem} (2){files[1].suffix}")
     copy.write_bytes(files[1].read_bytes())
@@ -279,6 +282,7 @@ def test_a_file_with_the_samples_of_another_is_told_and_kept(files: list[Path]) 
     assert (language, said.endswith("ist es eine Kopie, weglassen")) == ("de", True)
 
 
+@pytest.mark.slow
 def test_a_unit_that_is_wrong_by_far_is_told_before_other_verbs_refuse_it(
     files: list[Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -320,6 +324,7 @@ def test_of_a_driven_machine_nothing_is_refused_that_a_base_model_takes(
     assert not any("refused" in note for note in told["notes"])
 
 
+@pytest.mark.slow
 def test_a_mapping_file_says_the_same(files: list[Path], tmp_path: Path) -> None:
     mapping = tmp_path / "map.yaml"
     mapping.write_text(

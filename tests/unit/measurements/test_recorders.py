@@ -84,6 +84,7 @@ def check(campaign: Imported, order: Sequence[float] = MOTIONS, later_s: float =
         assert shot.position.time_s[0] == pytest.approx(later_s, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_first_of_each_recorder_belong_together_in_whatever_order_they_are_named(tmp_path: Path) -> None:
     force, position = loggers(tmp_path)
     side_by_side = [file for pair in zip(force, position, strict=True) for file in pair]

@@ -187,6 +187,7 @@ def test_what_is_wrong_is_told_with_its_line(tmp_path: Path, change: object, tol
     assert f"{path}{told}" in str(refused.value)
 
 
+@pytest.mark.slow
 def test_force_and_position_of_a_plc_are_one_record_at_their_own_rates(tmp_path: Path) -> None:
     time = 1e-3 * np.arange(3000)
     cover = Group(5.0, ["GVL.fTemperature"], np.full((1, 600), 21.5))

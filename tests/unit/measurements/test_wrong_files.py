@@ -240,6 +240,7 @@ def test_a_column_whose_noise_is_small_has_one_value(tmp_path: Path) -> None:
     assert campaign.read(out).shots[0].mass_kg == pytest.approx(18.9005, abs=1e-4)
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     st.lists(

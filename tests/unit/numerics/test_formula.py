@@ -42,6 +42,7 @@ def _text(atom: Atom, argument: str, around: str) -> str:
     return f'import math\n\n\ndef law(a, b, _c, _d, p):\n    """Law."""\n{body}    return {around}\n'
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("argument", "around"), [("a", "a * (1.0 + s)"), ("abs(b)", "-b * s")])
 def test_every_atom_gives_the_same_bits_as_from_numba(argument: str, around: str) -> None:
     u = np.linspace(-0.02, 0.3, 101)

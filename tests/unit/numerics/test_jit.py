@@ -38,6 +38,7 @@ def run(directory: Path, processes: int = 1) -> list[str]:
     return " ".join(sorted(printed)).split()
 
 
+@pytest.mark.slow
 def test_of_two_processes_one_compiles_and_an_edited_callee_is_compiled_anew(tmp_path: Path) -> None:
     (tmp_path / "caller.py").write_text(CALLER)
     (tmp_path / "callee.py").write_text(CALLEE.format(2.0))
@@ -51,6 +52,7 @@ TOLD = (
 )
 
 
+@pytest.mark.slow
 def test_that_machine_code_is_missing_is_told_once_and_only_then(tmp_path: Path) -> None:
     (tmp_path / "caller.py").write_text(TOLD + CALLER)
     (tmp_path / "callee.py").write_text(CALLEE.format(2.0))
@@ -67,6 +69,7 @@ NAMED = (
 )
 
 
+@pytest.mark.slow
 def test_a_class_that_was_renamed_since_is_compiled_anew(tmp_path: Path) -> None:
     """The index on disk names the classes of the arguments, and reading it looks them up."""
     (tmp_path / "caller.py").write_text(NAMED.format("Before"))
@@ -114,6 +117,7 @@ def test_who_waits_too_long_compiles_as_well(tmp_path: Path, monkeypatch: pytest
     assert is_free(file)
 
 
+@pytest.mark.slow
 def test_without_a_place_for_a_cache_it_still_runs(tmp_path: Path) -> None:
     source = (
         "from impactcell.numerics.jit import _can_cache, compiled\n\n"

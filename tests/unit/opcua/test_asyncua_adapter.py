@@ -33,6 +33,7 @@ def insides(source: str) -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_no_other_module_looks_inside_asyncua() -> None:
     modules = sorted(set(PRODUCT.rglob("*.py")) - {ADAPTER})
     found = {str(path.relative_to(PRODUCT)): insides(path.read_text()) for path in modules}

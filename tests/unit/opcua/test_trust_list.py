@@ -181,6 +181,7 @@ def test_what_is_refused(pki: Path, what: str) -> None:
         trust.check(found)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::cryptography.utils.CryptographyDeprecationWarning")
 def test_a_certificate_that_is_no_certificate_is_untrusted_and_nothing_else(tmp_path: Path) -> None:
     """Bytes of a good one changed at random: whatever the library below thinks of them, they are refused."""

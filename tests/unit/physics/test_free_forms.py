@@ -35,6 +35,7 @@ def _free(identifier: str, values: np.ndarray, lower: float = LOWER, upper: floa
     return _plant({identifier: {"lower": lower, "upper": upper, **coefficients}})
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.floats(-10, 10), min_size=COEFFICIENTS, max_size=COEFFICIENTS),
     st.floats(0.0, 1.0),

@@ -76,6 +76,7 @@ def positions(plant: Plant, tap: TapInput) -> np.ndarray:
     return simulate_tap(plant, tap).sample(TIMES).position_m
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.floats(-10, 10), min_size=ACROSS * (SPANS + 3), max_size=ACROSS * (SPANS + 3)),
     st.floats(-0.4, 1.4),

@@ -9,6 +9,7 @@ from tests.modified_euler import simulate_modified_euler
 PLANT = Plant(6.5e5, 465.0, 0.2, 0.152, effects={"viscous_friction": {"viscous_coefficient_n_s_per_m": 85.0}})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "tap",
     [

@@ -234,6 +234,7 @@ def test_a_file_that_ends_the_program_is_a_fault(own: Path) -> None:
     assert "own_pull" not in LIBRARY
 
 
+@pytest.mark.slow
 def test_no_traceback_reaches_the_user(own: Path) -> None:
     own.write_text(OWN.replace("return p[0]", "return str(p)"), encoding="utf-8")
     done = subprocess.run(

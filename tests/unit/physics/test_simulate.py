@@ -180,6 +180,7 @@ def test_a_part_on_a_slope_too_steep_never_stops() -> None:
         simulate_tap(steep, TapInput(0.05, 18.9, 1e-3))
 
 
+@pytest.mark.slow
 def test_a_part_that_runs_away_over_waves_is_given_up_and_no_sample_is_taken_for_a_rest() -> None:
     # In the time allowed it would cross some 1e8 waves.
     waves = {"amplitude": 1e-3, "period_m": 1e-4, "phase_rad": 0.0}

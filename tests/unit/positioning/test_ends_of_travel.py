@@ -51,6 +51,7 @@ def play(
     return task, lain
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("inside_m", [0.0, 20e-6, 200e-6])
 def test_parts_settle_at_both_ends_and_none_passes_them(inside_m: float) -> None:
     """Before, 0 of 25 settled at an end itself: the tap was refused, and no gentler one was tried."""
@@ -69,6 +70,7 @@ def test_parts_settle_at_both_ends_and_none_passes_them(inside_m: float) -> None
     assert np.mean(taps) < 4.5
 
 
+@pytest.mark.slow
 def test_the_first_task_of_a_cell_may_lead_to_an_end() -> None:
     made = planner()
     task, lain = play(made, NOMINAL, 40e-3, 39e-3, 15.0, np.random.default_rng(1))
@@ -88,6 +90,7 @@ def taught(tolerance_m: float) -> TapPlanner:
 MICROMETRES = st.floats(0.0, 40e3)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(
     tolerance_m=st.sampled_from([10e-6, 50e-6]),

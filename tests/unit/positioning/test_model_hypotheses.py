@@ -72,6 +72,7 @@ def scattering(axis: int, above: float, shift: float = 1e12) -> PlannerPosterior
     return replace(START, scatter_weights=np.vstack([weights / weights.sum(), START.scatter_weights[1:]]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scatter", [0.005, 0.03, 0.08])
 def test_with_nothing_missing_the_evidence_stays_small(scatter: float) -> None:
     most = [max(taught(np.zeros(FEATURES), 15, seed, scatter)[1]) for seed in range(12)]

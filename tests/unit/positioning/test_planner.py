@@ -43,6 +43,7 @@ def deliver(
     return taps, remaining, None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tolerance_m", [10e-6, 50e-6])
 def test_cells_off_by_a_tenth_end_inside_and_never_beyond(tolerance_m: float) -> None:
     rng = np.random.default_rng(11)
@@ -65,6 +66,7 @@ def test_cells_off_by_a_tenth_end_inside_and_never_beyond(tolerance_m: float) ->
     assert np.mean(counts) < 5.0
 
 
+@pytest.mark.slow
 def test_the_first_task_of_a_cell_does_not_creep() -> None:
     """Before, 13.6 taps on the mean and 35 at most: taps of some µm, each before one that would settle it."""
     plant, counts = Plant(7.15e5, 511.5, 0.13, 0.76 * 0.13), []
@@ -91,6 +93,7 @@ def test_one_sided_never_pushes_back() -> None:
     assert "beyond its target" in answer.reason
 
 
+@pytest.mark.slow
 def test_two_sided_recovers_from_overshoot() -> None:
     planner = TapPlanner(tolerance_m=50e-6, plant=NOMINAL, two_sided=True)
     rng = np.random.default_rng(5)
@@ -118,6 +121,7 @@ def test_limits_hold() -> None:
             assert tap.overshoot_probability <= 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("velocity_step", "stroke_step"), [(1e-3, 20e-6), (10e-3, 100e-6), (50e-3, 1.5e-3)])
 def test_taps_are_planned_of_what_can_be_commanded(velocity_step: float, stroke_step: float) -> None:
     """They were planned between the codes of the registers, and rounded up beyond limits when commanded."""
@@ -171,6 +175,7 @@ def test_a_remainder_below_what_can_be_controlled_is_unreachable() -> None:
     assert "overshoots" in answer.reason
 
 
+@pytest.mark.slow
 def test_a_part_that_no_tap_moves_any_more_is_out_of_reach_until_somebody_asks_again() -> None:
     """Before, a part of 39 kg that lacked 0.02 µm was tapped a hundred times."""
     planner = TapPlanner()
@@ -194,6 +199,7 @@ def test_a_part_that_no_tap_moves_any_more_is_out_of_reach_until_somebody_asks_a
     assert isinstance(planner.next_tap(5e-3, 30.0), Tap)  # another part
 
 
+@pytest.mark.slow
 def test_a_cell_without_a_stroke_strikes_by_velocity() -> None:
     plant = Plant(6.5e5, 465.0, 0.15, 0.76 * 0.15)
     planner = TapPlanner(tolerance_m=0.3e-3, max_stroke_m=math.inf, plant=plant)
@@ -293,6 +299,7 @@ def test_a_field_that_no_plant_has_is_named() -> None:
         TapPlanner(plant={"mu": 0.2, "mu_s": 0.2})
 
 
+@pytest.mark.slow
 def test_same_history_same_taps() -> None:
     plant = Plant(6.0e5, 500.0, 0.17, 0.76 * 0.17)
     runs = []
@@ -321,6 +328,7 @@ def test_friction_along_the_stroke_is_planned_with() -> None:
     assert (after.velocity_m_s, after.stroke_m) != (before.velocity_m_s, before.stroke_m)
 
 
+@pytest.mark.slow
 def test_what_the_model_lacks_is_learned_and_told() -> None:
     """Viscous friction that the planner knows nothing of: no overshoot, and it says that it lacks it."""
     rng, tasks = np.random.default_rng(21), np.random.default_rng(21)
@@ -347,6 +355,7 @@ def test_what_the_model_lacks_is_learned_and_told() -> None:
     assert np.mean(counts[10:]) < 4.0
 
 
+@pytest.mark.slow
 def test_nothing_is_said_to_be_missing_where_the_model_is_right() -> None:
     planner, rng = TapPlanner(tolerance_m=50e-6, plant=NOMINAL), np.random.default_rng(22)
     for _ in range(25):
@@ -357,6 +366,7 @@ def test_nothing_is_said_to_be_missing_where_the_model_is_right() -> None:
     assert (np.abs(weights) < 3.5 * np.sqrt(np.diag(planner.posterior.cov)[5:])).all()
 
 
+@pytest.mark.slow
 def test_learning_survives_being_stored() -> None:
     """A planner that goes on from what another has stored plans the same tap, and has the same doubts."""
     from impactcell.serialization import Versioned
@@ -371,6 +381,7 @@ def test_learning_survives_being_stored() -> None:
     assert again.predictions == planner.predictions
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("along", [-0.1, 0.1])
 def test_hardly_outside_the_tolerance_a_tap_moves_the_part_wherever_it_lies(along: float) -> None:
     """A table carried on from another place had taps in it that bring the part in and move nothing."""

@@ -68,6 +68,7 @@ def taught(noise: float, taps: int, seed: int, sigma: float = 0.03) -> tuple[Pla
     return belief, np.array([math.log(0.76 * mu_s), math.log(k), math.log(b)])
 
 
+@pytest.mark.slow
 def test_learns_the_cell_and_knows_how_well() -> None:
     errors = []
     for seed in range(4):
@@ -80,6 +81,7 @@ def test_learns_the_cell_and_knows_how_well() -> None:
     assert np.sqrt((errors_**2).mean()) < 1.5  # not overconfident
 
 
+@pytest.mark.slow
 def test_learns_its_own_scatter() -> None:
     calm, _ = taught(0.0, 60, 1, sigma=0.012)
     rough, _ = taught(0.0, 60, 1, sigma=0.06)
@@ -87,6 +89,7 @@ def test_learns_its_own_scatter() -> None:
     assert rough.scatter > 0.04
 
 
+@pytest.mark.slow
 def test_an_outlier_teaches_little() -> None:
     belief, _ = taught(0.0, 15, 3)
 
@@ -130,6 +133,7 @@ def test_a_tracker_that_contradicts_prevails_but_is_doubted() -> None:
     assert std(moved)[0] > 0.05
 
 
+@pytest.mark.slow
 def test_a_batch_change_frees_friction_and_nothing_else() -> None:
     belief, _ = taught(0.0, 20, 4)
     new = condition_on_friction(belief, belief.mu_k, 0.001, batch_changed=True)

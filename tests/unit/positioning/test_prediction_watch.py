@@ -24,6 +24,7 @@ def taps_until(alarm: str, shift: float, spread: float, seed: int, most: int = 4
     return most
 
 
+@pytest.mark.slow
 def test_calibrated_predictions_are_seldom_doubted() -> None:
     delays = [taps_until("doubted", 0.0, 1.0, seed) for seed in range(40)]
     assert np.mean(delays) > DOUBT

@@ -14,6 +14,8 @@ from impactcell.prediction.contact_onset import GAP_ENOUGH, fit_plant_and_onset,
 from impactcell.records import POSITION_SCALE_STD, Capture, Channel, Quality
 from tests.taps import Tap
 
+pytestmark = pytest.mark.slow
+
 
 def triggered(
     late_s: float, effects: dict[str, dict[str, float]] | None = None, seed: int = 3

@@ -99,6 +99,7 @@ def test_the_printed_coefficients_come_back_out_of_the_reference_plant() -> None
     assert np.abs(slide - 1.0).max() < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stroke_m", [math.inf, 1.5e-3])
 def test_calibrated_equations_invert_the_simulators_taps(stroke_m: float) -> None:
     tap = TapInput(0.1, 18.9, stroke_m, halts_at_separation=math.isinf(stroke_m))
@@ -118,6 +119,7 @@ def test_calibrated_equations_invert_the_simulators_taps(stroke_m: float) -> Non
                 assert slide.std > 0.0
 
 
+@pytest.mark.slow
 def test_the_standard_deviations_follow_what_is_not_known() -> None:
     tap = TapInput(0.1, 18.9, halts_at_separation=True)
     model = Model("m", PLANT, PRIOR, calibrate(PLANT, tap, [18.9], np.linspace(0.05, 0.1, 9), FRICTIONS))
@@ -238,6 +240,7 @@ def _by_figures(model: Model, tap: Tap, cycle: int, rng: np.random.Generator) ->
     return Capture(cycle, tap.velocity_m_s, tap.mass_kg, None, None, stroke_m=tap.stroke_m, summary=figures)
 
 
+@pytest.mark.slow
 def test_figures_of_a_module_that_contradict_each_other_are_uncertain() -> None:
     """A mass, a velocity or a scale that is wrong by 5 % bends mu_s by 6 to 30 %, and nothing else shows."""
     stroke_m = 1.5e-3

@@ -190,6 +190,7 @@ def test_a_model_known_to_miss_publishes_the_equations() -> None:
     assert "misses" in found.mu_s.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["channel_skew", "viscous_friction"])
 def test_what_a_model_lacks_leaves_mu_k_within_what_is_said_of_it(law: str) -> None:
     """A force 0.2 ms late bent mu_k by a third, though the slide shows it; what acts there widens it."""
@@ -215,6 +216,7 @@ def test_what_a_model_lacks_leaves_mu_k_within_what_is_said_of_it(law: str) -> N
 damage = st.sampled_from(["cut", "shift", "scale", "spikes", "nan", "repeat", "reverse", "noise"])
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(which=st.sampled_from(["force", "position"]), kind=damage, seed=st.integers(0, 10**6))
 def test_no_damage_to_a_capture_raises(which: str, kind: str, seed: int) -> None:

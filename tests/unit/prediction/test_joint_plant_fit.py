@@ -144,6 +144,7 @@ def test_a_sample_at_first_contact_itself_is_no_misfit(at_contact_n: float) -> N
     assert found.model.plant.damping_n_s_per_m == pytest.approx(kept.model.plant.damping_n_s_per_m, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_law_that_the_model_lacks_bends_it_little_and_is_seen() -> None:
     found = fit_plant([extract(tap) for tap in campaign(2, DRAG)], 9.81)
     assert found.gap > 1.5
@@ -167,6 +168,7 @@ def light_part(stroke_m: float, effects: dict[str, dict[str, float]], force_hz: 
     return [tap.capture(rng, cycle=number, force_hz=force_hz) for number, tap in enumerate(taps, 1)]
 
 
+@pytest.mark.slow
 def test_a_law_that_bends_everything_leaves_stiffness_and_damping_right() -> None:
     """A film this thick in a light part's way takes the fit of all to mu_k = mu_s, where it finds no rest."""
     film = {"viscous_friction": {"viscous_coefficient_n_s_per_m": 60.0}}

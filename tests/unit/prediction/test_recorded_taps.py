@@ -110,6 +110,7 @@ def own_std(of: Coefficient) -> float:
     return math.sqrt(of.std**2 - of.common_std**2)
 
 
+@pytest.mark.slow
 def test_errors_as_large_as_told_are_covered() -> None:
     """All that is told of taps and of their plant off by as much as is said of it: Bayes' own coverage."""
     rng, pulls = np.random.default_rng(12), []
@@ -235,6 +236,7 @@ def test_a_cell_that_knows_its_mass_drive_and_sensors_better_sees_friction_bette
     assert stds_of_mu_k[1] < 0.3 * stds_of_mu_k[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("position", [1.0, 0.997, 1.003])
 def test_a_campaign_told_a_little_wrong_has_the_right_plant(position: float) -> None:
     """A mass differs from tap to tap, the scale of the position does not."""

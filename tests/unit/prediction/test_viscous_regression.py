@@ -28,6 +28,7 @@ def shots(seed: int, viscous: bool = True) -> tuple[list[Tap], list[Capture]]:
     return made, [tap.capture(rng, cycle=number) for number, tap in enumerate(made, 1)]
 
 
+@pytest.mark.slow
 def test_least_squares_finds_k_v_and_every_mu_k_within_its_error() -> None:
     pulls = []
     for seed in range(6):
@@ -45,6 +46,7 @@ def test_without_viscous_friction_none_is_found() -> None:
     assert abs(found.coefficient_n_s_per_m) < 4.0 * found.std
 
 
+@pytest.mark.slow
 def test_the_decrement_agrees_but_less_closely() -> None:
     ours, theirs = [], []
     for seed in range(4):

@@ -34,6 +34,7 @@ def drawn(rng: np.random.Generator, velocity_mm_per_min: float) -> Tap:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_intervals_cover_and_errors_have_the_size_they_claim() -> None:
     rng = np.random.default_rng(1)
     pulls, inside = [], []
@@ -201,6 +202,7 @@ def test_a_capture_of_another_part_is_not_believed() -> None:
     assert caught.value.gap > 3.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("velocity_mm_per_min", "share"), [(2000, 0.55), (3000, 0.69), (6000, 1.0)])
 def test_the_mean_of_many_taps_is_off_by_what_they_share(velocity_mm_per_min: int, share: float) -> None:
     """Cells whose constants are not quite the model's: between cells as foretold, within one by the rest.

@@ -23,6 +23,7 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], 
     return (package / "__main__.py").write_text
 
 
+@pytest.mark.slow
 async def test_a_verb_of_this_program() -> None:
     outcome = await run_verb(["check", "there-is-none.yaml"], 60.0)
     assert outcome.exit_code == 2
@@ -51,6 +52,7 @@ async def test_memory_is_limited(program: Callable[[str], object]) -> None:
     assert (await run_verb([], 60.0)).exit_code == 7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["time", "cancel"])
 async def test_it_ends_with_all_that_it_started(program: Callable[[str], object], how: str) -> None:
     program(

@@ -165,6 +165,7 @@ def test_a_file_without_end_is_refused(tmp_path: Path) -> None:
         load(Path("/dev/zero"))
 
 
+@pytest.mark.slow
 def test_a_file_of_nested_aliases_is_refused(tmp_path: Path) -> None:
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 9)]

@@ -14,6 +14,7 @@ from impactcell.scada.users import User, Users, read_users, write_users
 ENTRY = "name: eve, role: observer, password: x"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "told"),
     [

@@ -55,6 +55,7 @@ class Recorder:
         return self.module.shown.positioning
 
 
+@pytest.mark.slow
 async def test_no_tap_passes_a_limit_because_its_register_rounds(tmp_path: Path, coarse: CellConfig) -> None:
     """0.0996 m/s and 1.46 mm were struck with 0.1 m/s and 1.5 mm, and learned from as planned."""
     module, worker = ToldModule.of(coarse), worker_of(coarse, tmp_path / "j")

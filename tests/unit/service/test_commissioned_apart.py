@@ -3,6 +3,8 @@
 from collections import Counter
 from dataclasses import replace
 
+import pytest
+
 from impactcell.service.factory import COMMISSIONED_APART, cell_design
 from impactcell.settings import read_cell
 from tests.integration.processes import CONFIG
@@ -16,6 +18,7 @@ def delay(name: str) -> int:
     return cell_design(replace(cell, settings=settings)).tracker.commissioning_delay
 
 
+@pytest.mark.slow
 def test_cells_are_spread_over_the_cycles_that_there_are_for_it() -> None:
     cells_at = Counter(delay(f"cell-{number}") for number in range(CELLS))
     assert set(cells_at) <= set(range(COMMISSIONED_APART))

@@ -19,6 +19,8 @@ from impactcell.service.history_source import ALARMS_AT_ONCE, VALUES_AT_ONCE, Jo
 from tests.patience import PATIENCE_S
 from tests.snapshots import make_capture, make_snapshot
 
+pytestmark = pytest.mark.slow
+
 CELL, VARIABLE = "press-1", "Friction/StaticFriction"
 COUNT = 2 * VALUES_AT_ONCE + 10
 

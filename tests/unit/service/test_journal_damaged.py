@@ -181,6 +181,7 @@ async def test_one_bit_in_the_state_is_not_believed_and_an_earlier_state_is_used
     await worker.close()
 
 
+@pytest.mark.slow
 async def test_a_cell_runs_on_whatever_page_is_damaged(tmp_path: Path, design: core.CellDesign) -> None:
     path = tmp_path / "whole" / "j"
     path.parent.mkdir()

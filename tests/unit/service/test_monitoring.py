@@ -163,6 +163,7 @@ def test_there_are_so_many_scrapers_at_a_time_and_no_more(monkeypatch: pytest.Mo
         assert status == 200
 
 
+@pytest.mark.slow
 def test_a_scraper_that_goes_away_is_no_news(
     capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,6 +25,8 @@ from tests.integration.processes import CONFIG
 from tests.patience import PATIENCE_S
 from tests.snapshots import make_capture, make_snapshot
 
+pytestmark = pytest.mark.slow
+
 ALARM = "ModuleConnection"
 ANNA = Actor("anna", Role.OPERATOR, "10.0.0.7")
 STEPS = 6

@@ -28,6 +28,7 @@ class Tapper:
         return self.module.shown.positioning
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("taken_away", [True, False])
 async def test_the_next_part_is_not_taken_for_the_one_that_was_tapped(
     module: ToldModule, task: PositioningTask, taken_away: bool

@@ -38,6 +38,7 @@ class Tapper:
         return shown
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("looked_at", [True, False])
 async def test_a_request_that_is_taken_back_during_a_tap_goes_on(
     module: ToldModule, task: PositioningTask, looked_at: bool
@@ -67,6 +68,7 @@ async def settled(module: ToldModule, task: PositioningTask) -> None:
     assert outcome.settled
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("session", "target_m", "begins"), [(1, 0.02, False), (2, 0.02, True), (2, 0.01, False)]
 )
@@ -91,6 +93,7 @@ async def test_the_first_target_of_a_module_that_was_started_anew_is_a_new_one(
         assert task.state.running
 
 
+@pytest.mark.slow
 async def test_a_target_that_a_module_that_was_started_anew_shows_again_is_told(
     module: ToldModule, task: PositioningTask, caplog: pytest.LogCaptureFixture
 ) -> None:

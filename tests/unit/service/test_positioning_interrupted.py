@@ -247,6 +247,7 @@ async def test_a_task_whose_tap_a_fault_of_the_cell_has_interrupted_is_over_and_
     assert striker.taps == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ends", "session", "begins"),
     [("settled", 1, False), ("aborted", 1, False), ("faulted", 1, False), ("settled", 2, True),

@@ -52,6 +52,7 @@ for batch in type(design.tracker.batch):
 """
 
 
+@pytest.mark.slow
 def test_after_both_warm_ups_a_tracker_compiles_nothing_more() -> None:
     """A demo stood still for 12 s on a new machine, just when its material had changed."""
     done = subprocess.run(

@@ -143,6 +143,7 @@ def test_cells_behind_one_gateway_have_one_request_in_flight(tmp_path: Path) -> 
     assert len(read_cells([first, elsewhere])) == 2
 
 
+@pytest.mark.slow
 def test_cells_of_one_line_agree_about_it(tmp_path: Path) -> None:
     line = {"device": "/dev/ttyUSB0", "baudrate": 19_200}
     first = cell_file(tmp_path, "a", transport="rtu", serial=line)

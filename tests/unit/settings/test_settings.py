@@ -155,6 +155,7 @@ def test_faults_of_cell_map_and_model_at_once(config: Path) -> None:
     assert "models/bad.yaml" in str(caught.value)
 
 
+@pytest.mark.slow
 def test_cells_of_one_process_do_not_share_what_is_one_cells(config: Path) -> None:
     journal = f"cell: prototype\njournal: {{file: {config / 'one.sqlite'}}}"
     first = edited(config, "cell: prototype", journal, "first")

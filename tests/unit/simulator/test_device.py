@@ -167,6 +167,7 @@ def test_a_short_counter_that_begins_anew_counts_what_its_ring_lost() -> None:
     assert client.get("ring_cycle").tolist().count(0) == 0
 
 
+@pytest.mark.slow
 def test_short_registers_that_count_begin_anew() -> None:
     """Before, the module broke off as soon as one of them was full."""
     content = yaml.safe_load((CONFIG / "maps" / "fpga-v1.yaml").read_text())

@@ -162,6 +162,7 @@ def test_an_actuator_that_never_halts_is_refused() -> None:
         simulate_tap(PLANT, TapInput(0.06, 18.9))
 
 
+@pytest.mark.slow
 def test_a_slide_that_cannot_end_is_reported() -> None:
     downhill = Plant(6.5e5, 465.0, 0.02, 0.01, effects={"surface_tilt": {"tilt_rad": -0.2}})
     with pytest.raises(NeverAtRestError, match="still slides"):

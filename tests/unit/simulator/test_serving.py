@@ -84,6 +84,7 @@ def test_any_scenario_is_read_or_refused(tmp_path_factory: pytest.TempPathFactor
     assert str(file) in message
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     ["a: !!int x\n", "[" * 5000, "a: &a [*a]\n", "1: 2\n", "? [1]\n: 2\n", "a: &a [1,1,1,1,1,1,1,1,1]\n"],
@@ -262,6 +263,7 @@ def read_registers(port: int, address: int, count: int) -> bytes:
     return reply[9:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("how", "code"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)])
 def test_serves_until_it_is_told_to_stop(tmp_path: Path, how: signal.Signals, code: int) -> None:
     scenario = (CONFIG / "sim" / "demo.yaml").read_text().replace("../maps", str(CONFIG / "maps"))

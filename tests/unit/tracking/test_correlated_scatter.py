@@ -116,6 +116,7 @@ def shifts(values):
     return [alarm.cycle for alarm in series.alarms if alarm.alarm == "BatchShift"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.2, 0.5, 0.7])
 def test_scatter_that_is_correlated_is_no_change_of_batch(correlation):
     """Taken for white, it gave one in some 1500 (0.2) and 400 (0.5) cycles: about 8 and 30 here."""
@@ -124,6 +125,7 @@ def test_scatter_that_is_correlated_is_no_change_of_batch(correlation):
     assert sum(cycle >= learned_until for cycle in found) <= 1
 
 
+@pytest.mark.slow
 def test_a_change_of_batch_in_correlated_scatter_is_found():
     values = autoregressive(0.2, 2000, 30)
     values[1200:] += 2.5
@@ -131,6 +133,7 @@ def test_a_change_of_batch_in_correlated_scatter_is_found():
     assert 1200 <= found < 1220
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", [150_117, 150_143])
 def test_scatter_that_is_correlated_is_no_level_that_walks(key):
     """Two of 160 cells where it was taken for one: the step was found after 810 cycles, and not in 1000."""
@@ -146,6 +149,7 @@ def test_scatter_that_is_correlated_is_no_level_that_walks(key):
     assert any(cycle >= 1000 for cycle in found)
 
 
+@pytest.mark.slow
 def test_a_young_cell_does_not_take_a_step_for_correlation():
     """With innovations, that are all of one sign until the step is found, 2 sd took 42 cycles for 24."""
     delays = []
@@ -156,6 +160,7 @@ def test_a_young_cell_does_not_take_a_step_for_correlation():
     assert np.mean(delays) < 25
 
 
+@pytest.mark.slow
 def test_batches_that_are_known_to_alternate_are_no_correlation():
     draw, batches = np.random.default_rng(60), np.arange(1500) // 5 % 2
     values = 0.2 + UNIT * (3.0 * batches + draw.normal(size=1500))
@@ -178,6 +183,7 @@ def gap_alarms(correlation, captures, seed, *, designed):
     return alarms
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.2, 0.4])
 def test_residuals_that_are_correlated_are_no_gap_of_the_model(correlation):
     """Taken for white, there were 59 (0.2) and 174 (0.4) alarms in these 50 000 captures, for 5 designed."""

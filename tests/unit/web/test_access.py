@@ -273,6 +273,7 @@ async def test_a_session_that_is_idle_ends(page: Page) -> None:
         assert (await client.get("/")).status_code == 303
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("role", Role)
 async def test_a_session_in_use_ends_too(page: Page, role: Role) -> None:
     async with page.logged_in(role) as client:

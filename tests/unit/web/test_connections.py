@@ -159,6 +159,7 @@ async def test_who_leaves_in_the_middle_of_a_form_is_no_fault(
     assert [record.message for record in caplog.records] == []
 
 
+@pytest.mark.slow
 async def test_a_request_that_the_end_cuts_off_is_no_fault(
     server: PageServer, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

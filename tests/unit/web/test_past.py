@@ -66,6 +66,7 @@ def test_what_is_over_is_read_once_and_what_comes_is_seen(tmp_path: Path) -> Non
     assert next(column.mu_s_low for column in trend(path, 0, 60 * SECOND, 6)) == pytest.approx(1.001)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("late_s", [0, 25, 100, 1000])
 def test_cycles_that_come_late_are_seen_where_they_belong(tmp_path: Path, late_s: int) -> None:
     """The clock of a module is behind the service's; 24 cycles come from its ring after an outage."""
@@ -95,6 +96,7 @@ def test_a_journal_that_is_begun_anew_has_nothing_of_the_one_before(tmp_path: Pa
     assert [(column.cycles, column.batch_id) for column in columns] == [(10, "B")] * 3
 
 
+@pytest.mark.slow
 def test_a_clock_that_steps_back_hides_nothing(tmp_path: Path) -> None:
     path, finished = tmp_path / "j.sqlite", Finished()
     with Journal(path, CELL) as journal:
@@ -124,6 +126,7 @@ def test_empty_stretches_are_left_out(tmp_path: Path) -> None:
     assert [column.cycles for column in columns] == [10, 1]
 
 
+@pytest.mark.slow
 def test_the_band_of_a_full_stretch_is_of_all_its_cycles_and_the_level_of_its_whole_time(
     tmp_path: Path,
 ) -> None:

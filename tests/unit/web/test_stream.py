@@ -108,6 +108,7 @@ async def test_a_frame_is_encoded_once_for_all(feed: LiveFeed, monkeypatch: pyte
     )  # the empty card before the first cycle too, if somebody was there in time
 
 
+@pytest.mark.slow
 async def test_a_slow_viewer_misses_frames_and_never_the_last(feed: LiveFeed) -> None:
     slow, quick = Viewer(feed, reads=1), Viewer(feed)
     for number in range(1, 101):

@@ -32,6 +32,7 @@ def learned(true_sizes, cycles, seed):
     return first, pca_variation.covariance(sums, cycles)
 
 
+@pytest.mark.slow
 def test_sizes_of_the_modes_are_found_without_bias():
     sizes = [1.0, 0.4, 0.2, 0.0, 0.0, 0.0]
     ratios = [np.diag(learned(sizes, 60, seed)[1])[:3] / np.square(sizes[:3]) for seed in range(20)]

@@ -27,6 +27,7 @@ def test_the_error_of_the_mean_is_added_to_that_of_a_cycle(strength):
     assert vector == pytest.approx(together @ np.linalg.solve(G, h))
 
 
+@pytest.mark.slow
 def test_the_mean_misfit_is_over_the_cycles_that_were_judged():
     grid = np.linspace(0.0, 4e-3, 5)
     state, judged = reference.initial_state(7), [0.5, None, 1.5, 4.0, None]

@@ -34,6 +34,7 @@ def followed(spread: np.ndarray, seed: int, knowledge: BatchKnowledge) -> tuple[
     return state, shifts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("knowledge", BatchKnowledge)
 @pytest.mark.parametrize("spread", SPREADS.values(), ids=SPREADS)
 def test_the_variance_is_that_of_the_estimates_and_no_shift_is_invented(spread, knowledge):

@@ -55,6 +55,7 @@ def assert_wear_goes_on(results: list[TrackingResult], since: int, offset: float
         assert wear.probability_above_limit < 0.01, cycle
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("expected", [True, False], ids=["announced", "unannounced"])
 @pytest.mark.parametrize("named_at", [60, 260])
 def test_the_first_batch_that_is_named_has_its_offset_and_wear_goes_on(named_at, expected):
@@ -95,6 +96,7 @@ def test_one_or_two_cycles_before_the_first_name_are_no_reference():
     assert last.wear.level == pytest.approx(level(100) + STEP, abs=4.0 * last.wear.level_std)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("changed_at", [50, 200])
 @pytest.mark.parametrize("how", ["found", "announced"])
 def test_a_name_that_comes_back_after_a_change_in_between_has_the_offset(changed_at, how):
@@ -126,6 +128,7 @@ def test_a_name_that_comes_back_without_a_change_is_still_the_reference():
     assert (last.state.filter.batches, last.batch.offset) == (("A",), 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known_from", [110, 260])
 @pytest.mark.parametrize("named", ["one name", "another name"])
 def test_a_reload_that_believes_ids_from_now_on_keeps_what_was_found_without_them(known_from, named):
@@ -149,6 +152,7 @@ def test_a_reload_that_believes_ids_from_now_on_has_the_first_batch_as_reference
     assert_wear_goes_on(results, 100, offset=0.0)
 
 
+@pytest.mark.slow
 def test_ids_that_are_not_believed_for_a_while_leave_no_filter_behind():
     """After known, unknown and known again the level was that of before, 0.03 too low, and sure of it."""
     readings = [FrictionObservation(n, friction(n, math.inf), STD, batch_id="A") for n in range(1, 460)]

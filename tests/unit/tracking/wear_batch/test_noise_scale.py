@@ -24,6 +24,7 @@ def scatter(seed, cycles=6000):
     return np.random.default_rng([13, seed]).normal(size=cycles)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.5, 1.5, 2.0, 4.0])
 def test_a_scatter_that_changes_is_believed_within_three_hundred_cycles(factor):
     for seed in range(4):
@@ -49,6 +50,7 @@ def test_scatter_of_heavy_tails_is_no_change_either():
     assert (np.diff(weights) >= 0.0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.5, 2.0])
 def test_scatter_that_changes_is_a_change_of_batch_only_until_that_is_noticed(factor):
     """With the scale of before, twice the scatter gave one every 130 cycles from there on."""

@@ -162,6 +162,7 @@ def tracked(level, knowledge, seed=0, ids=None):
     return outcomes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("knowledge", BatchKnowledge)
 @pytest.mark.parametrize(("before", "after"), [(0.2, 0.0), (0.05, 0.01), (0.02, 0.05)])
 def test_another_rate_is_found_and_told_and_no_batch_is_blamed(knowledge, before, after):
@@ -195,6 +196,7 @@ def test_values_without_scatter_have_one_rate(rate, std):
     assert abs(tracked.wear.rate_per_cycle - rate) < 2.0 * tracked.wear.rate_std < 0.3 * abs(rate)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [5.0, 15.0])
 @pytest.mark.parametrize("time", [50.0, 200.0, 600.0])
 def test_a_surface_that_runs_in_is_no_other_material(size, time):
@@ -207,6 +209,7 @@ def test_a_surface_that_runs_in_is_no_other_material(size, time):
     assert found == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1.0, -2.0])
 def test_a_batch_in_steep_wear_is_still_a_batch(size):
     level = bent(900, 900, 0.05, 0.05)
@@ -218,6 +221,7 @@ def test_a_batch_in_steep_wear_is_still_a_batch(size):
     assert abs(outcomes[-1].batch.last_shift - size * UNIT) < 3.0 * outcomes[-1].batch.last_shift_std
 
 
+@pytest.mark.slow
 def test_a_batch_found_before_the_rate_changed_stays_as_it_was_found():
     level = bent(1000, 700, 0.05, 0.0)
     level[400:] += 3.0
@@ -229,6 +233,7 @@ def test_a_batch_found_before_the_rate_changed_stays_as_it_was_found():
     assert abs(outcomes[-1].wear.level - BASE - UNIT * (level[-1] - 3.0)) < 3.0 * outcomes[-1].wear.level_std
 
 
+@pytest.mark.slow
 def test_known_batches_keep_their_offsets_when_the_rate_changes():
     """A bank that does not know that a batch has come back knows its offset less well."""
     turns = np.arange(1000) // 60 % 2
@@ -255,6 +260,7 @@ def test_named_batches_that_differ_do_not_keep_a_rate_from_being_found():
     assert 600 < outcomes[-1].state.rate_change.detected_at < 700
 
 
+@pytest.mark.slow
 def test_a_rate_that_has_just_been_found_is_not_followed_by_another():
     """Weights that no longer added up to one made the next hypothesis e^150 too heavy after lost cycles."""
     cycles = [k if k < 450 else k + 1000 for k in range(520)]

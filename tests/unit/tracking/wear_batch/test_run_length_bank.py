@@ -68,6 +68,7 @@ def exact_posterior(values, hazard, step_std, slope_std):
     return last, float(w @ means), total
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shift", [0.0, 1.5, 4.0])
 def test_last_change_and_slope_against_enumeration(shift):
     rng = np.random.default_rng(3)
@@ -86,6 +87,7 @@ def test_last_change_and_slope_against_enumeration(shift):
     assert densities.sum() == pytest.approx(total, abs=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shift", [0.0, 1.5, 4.0])
 def test_the_statistic_against_enumeration_over_every_scale_of_the_wear(shift):
     rng = np.random.default_rng(8)
@@ -224,6 +226,7 @@ def test_how_many_outliers_there_are_is_learned(share):
     assert 0.6 * share <= learned <= 1.2 * share + 0.2 * prior
 
 
+@pytest.mark.slow
 def test_the_tracker_gives_the_alarms_of_its_bank_alone():
     rng = np.random.default_rng(12)
     z = rng.normal(size=1600) + 3.3e-4 * np.arange(1600)

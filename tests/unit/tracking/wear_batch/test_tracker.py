@@ -276,6 +276,7 @@ def test_a_first_estimate_however_far_off_is_neither_batch_nor_wear(config, off)
     assert abs(last.level - 0.2) < 4.0 * last.level_std < 4e-3
 
 
+@pytest.mark.slow
 def test_the_interval_of_cycles_left_is_not_that_of_wear_that_is_steady_for_ever():
     """Wear that slows down by half over the next thousand cycles, as it was seen for a thousand."""
     readings = series(1000, seed=3, slope=2e-5)
@@ -288,6 +289,7 @@ def test_the_interval_of_cycles_left_is_not_that_of_wear_that_is_steady_for_ever
     assert wear.cycles_to_limit_high < 2.0 * slowed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("batch", [None, "A"], ids=["unknown", "known"])
 @pytest.mark.parametrize(
     ("wear", "limit"),
@@ -334,6 +336,7 @@ def test_wear_reset_starts_a_new_reference():
     assert fresh.state.noise.factor == last.state.noise.factor or fresh.used
 
 
+@pytest.mark.slow
 def test_how_friction_walks_stays_learned_over_a_reset_of_wear():
     """It was taken for steady until the walk was found anew, and each of its turns for a batch."""
     rng = np.random.default_rng(3)
@@ -363,6 +366,7 @@ def test_the_scale_of_the_noise_is_learned(declared):
     assert state.noise.factor * state.noise.usual_std**2 == pytest.approx(STD**2, rel=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
 def test_a_restored_state_replays_to_the_same_bits(config):
     readings = series(700, step=3.0, at=350, batch="A")
@@ -405,6 +409,7 @@ def test_no_readings_whatever_break_the_state(readings, config):
     assert pack(unpack(TrackerState, pack(state))) == pack(state)
 
 
+@pytest.mark.slow
 def test_a_change_among_the_first_cycles_leaves_the_level_that_of_the_cycles_before_it():
     """Friction at the first batch is what it was drawn with, whether five cycles of it came or hundreds."""
     lasts = [run(UNKNOWN, series(120, seed=seed, slope=0.0, step=4.0, at=5))[-1] for seed in range(10)]
@@ -443,6 +448,7 @@ def test_what_estimates_share_is_learned_anew_with_the_level_and_kept_over_unusa
     assert renewed.wear.level_common_std == pytest.approx(0.001)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("config", [KNOWN, UNKNOWN], ids=["known", "unknown"])
 def test_one_wrong_cycle_number_bends_neither_level_nor_rate(config):
     """All is as if that cycle had not been measured."""

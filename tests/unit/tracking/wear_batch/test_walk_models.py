@@ -93,12 +93,14 @@ def test_the_evidence_is_how_much_more_likely_the_cycles_are_under_another_walk(
     assert len(models.cycles) == 0
 
 
+@pytest.mark.slow
 def test_of_white_scatter_no_walk_is_believed_nor_of_batches_of_some_hundred_cycles():
     assert set(believed(white(1, 6000))) == {(0.0, 0.0)}
     steps = np.cumsum(np.where(np.arange(6000) % 300 == 299, 5.0 * white(2, 6000), 0.0))
     assert set(believed(white(3, 6000) + steps)) == {(0.0, 0.0)}
 
 
+@pytest.mark.slow
 def test_a_level_that_walks_is_found_and_when_it_ends():
     values = white(4, 9000) + np.append(walk(4, 4500, 0.05), np.full(4500, walk(4, 4500, 0.05)[-1]))
     found = believed(values)
@@ -121,6 +123,7 @@ def test_the_walk_that_was_commissioned_is_among_those_that_are_compared():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("level", "before"),
     [(swing(5000, 3.0, 2000), 25), (swing(5000, 1.0, 2000), 11), (walk(6, 5000, 0.05), 17)],
@@ -135,6 +138,7 @@ def test_a_level_that_moves_slowly_is_few_changes_of_batch(level, before):
     assert all(cycle < 3000 for cycle in found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("knowledge", BatchKnowledge)
 def test_the_tracker_takes_the_bank_of_the_walk_that_it_believes(knowledge):
     settings, state, notes = TrackerSettings(batch=knowledge), wear_batch.initial_state(), []
@@ -161,6 +165,7 @@ def bank_of(values, variance):
     return bank, count, total
 
 
+@pytest.mark.slow
 def test_a_change_that_is_taken_back_leaves_no_offset_in_the_level_of_a_known_batch():
     """Wear that accelerates has some until its slope is seen to walk: 5 and 8 deviations were left."""
     cycles = np.arange(1, 801)
@@ -228,6 +233,7 @@ def test_a_scatter_grows_beside_the_walk_that_is_believed():
     assert not walking.evidence.any()
 
 
+@pytest.mark.slow
 def test_a_scatter_that_doubles_is_soon_believed_and_told_of_no_batch():
     """Weighed under the scatter of before alone there were nine changes of batch in these."""
     for seed in range(17, 24):

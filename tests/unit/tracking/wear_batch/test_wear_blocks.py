@@ -184,6 +184,7 @@ def followed(state, values, first=0, settings=UNKNOWN, batch=None):
     return result
 
 
+@pytest.mark.slow
 def test_a_state_without_blocks_goes_on_from_what_its_bank_has_learned():
     """As that of an earlier version, which kept none."""
     values = 0.2 + 5e-6 * np.arange(600) + STD * np.random.default_rng(3).normal(size=600)
@@ -198,6 +199,7 @@ def test_a_state_without_blocks_goes_on_from_what_its_bank_has_learned():
     assert abs(after.wear.level - whole.wear.level) < whole.wear.level_std
 
 
+@pytest.mark.slow
 def test_an_outlier_moves_nothing_and_a_late_cycle_is_left_out():
     values = 0.2 + STD * np.random.default_rng(4).normal(size=300)
     plain = followed(initial_state(), values)
@@ -247,6 +249,7 @@ for seed in (2, 4):
 """
 
 
+@pytest.mark.slow
 def test_a_level_that_swings_leaves_the_slopes_finite_and_near_in_memory_that_is_theirs(cache):
     """A segment without probability stood before others: all were dropped, and the next wrote past the end.
 
