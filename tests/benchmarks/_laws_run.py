@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +23,13 @@ from impactcell.discrepancy.laws.covariates import visited
 from impactcell.discrepancy.model import Problem, refit_shot_parameters
 from impactcell.discrepancy.search import GapMeasure, Part
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
+from impactcell.physics import LawKind
 from impactcell.physics.bspline import spline_basis
 from impactcell.physics.effects import LIBRARY
 from impactcell.records import Samples
 from simulator.campaign import make
 from simulator.campaign_scenario import CampaignScenario
+from tests.benchmarks._laws_rivals import compare
 from tests.discrepancy.study import Job, campaign, hidden, recorded, scenario
 
 ROWS = Path("bench-results/laws.jsonl")
@@ -42,6 +45,13 @@ FASTER_SEED = 7_000_000
 """By how much later the seeds of those campaigns begin."""
 BEYOND = 0.01
 """Share of the tested range by which a covariate has to leave it to count as beyond [1]."""
+COMPARED = frozenset(
+    {
+        "free_drag_over_speed", "free_friction_over_speed", "free_friction_over_position",
+        "free_force_over_position", "free_damping_over_indentation", "free_stiffness_over_indentation",
+    }
+)  # fmt: skip
+"""Places of which the rivals have the covariates: not a gap, a time, or what a sensor shows."""
 Truth = Callable[[Samples, Mapping[str, Any]], Samples]
 
 
@@ -156,6 +166,9 @@ def run(item: Hidden, job: Job) -> dict[str, Any]:
         else round(steps[names[law_step + 1]] - steps[names[law_step]], 2),
         "law": None,
     }
+    if item.place in COMPARED:
+        truth = None if item.truth is None else partial(item.truth, p=hidden(job)[item.effect])
+        row["rivals"] = compare(item.place, truth, found)
     finding = found.law
     if finding is None:
         return row
@@ -210,8 +223,9 @@ def _faster(job: Job, found: DiscrepancyResult, finding: LawFinding) -> dict[str
 
 
 def _error(item: Hidden, job: Job, finding: LawFinding) -> float | None:
-    """RMS error of the function over the states that were visited, over its RMS; None without a truth.
+    """RMS error of the force, or factor, over the states that were visited, over its RMS.
 
+    None without a truth.
     A constant that the plant has taken up is no error.
     """
     form, seen = finding.term.form, finding.term.visited
@@ -225,6 +239,10 @@ def _error(item: Hidden, job: Job, finding: LawFinding) -> float | None:
     difference = function - truth
     if form.constant_is:
         difference, truth = difference - difference.mean(), truth - truth.mean()
+    if form.law_kind in {LawKind.BODY, LawKind.CONTACT} and seen.power is not None:
+        # A drag or a damping makes the force that it takes power by, over the speed.
+        speed = np.sqrt(seen.power)
+        difference, truth = speed * difference, speed * truth
     return float(np.sqrt(np.mean(difference**2) / np.mean(truth**2)))
 
 

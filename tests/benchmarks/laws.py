@@ -5,7 +5,8 @@ where there is nothing yet.
 """
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from operator import lt
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ LARGEST_GAP, LARGEST_ERROR = 1.2, 0.05
 """Held-out gap in noise floors, and relative error of the function, up to which a law counts as found."""
 LARGEST_FASTER_GAP = 1.5
 """The same at velocities that no tap had, unless the covariate is beyond the range that the report gives."""
+RIVALS = {"gaussian_process": "Gaussian process", "sindy": "PySINDy", "operon": "pyoperon"}
 Row = dict[str, Any]
 
 
@@ -144,6 +146,57 @@ def null_table() -> list[Table]:
     return [Table("Laws where there are none", columns, detail, note)]
 
 
+def rivals_table(rows: Sequence[Row]) -> list[Table]:
+    """The same campaigns by others, where they were given them."""
+    compared = [row for row in rows if "rivals" in row and not row["added"]]
+    if not compared:
+        return []
+    names = [name for name in RIVALS if all(name in row["rivals"] for row in compared)]
+    gaps: dict[str, list[float]] = {
+        "": [row["law"]["after"] if proposed(row) else row["rivals"]["nominal_gap"] for row in compared]
+    }
+    gaps |= {name: [row["rivals"][name]["gap"] for row in compared] for name in names}
+    judged = [row for row in compared if row["rivals"][names[0]]["error"] is not None]
+    errors = {
+        "": [row["rivals"]["law_error"] if row["rivals"]["law_error"] is not None else 1.0 for row in judged]
+    }
+    errors |= {name: [row["rivals"][name]["error"] for row in judged] for name in names}
+    seconds = {"": [row["law_seconds"] for row in compared]}
+    seconds |= {name: [row["rivals"][name]["seconds"] for row in compared] for name in names}
+    nominal = float(np.median([row["rivals"]["nominal_gap"] for row in compared]))
+
+    def shares(values: Mapping[str, list[float]], limit: float) -> list[str]:
+        return [f"{sum(one <= limit for one in of)}/{len(of)}" for of in values.values()]
+
+    def medians(values: Mapping[str, list[float]], form: str) -> list[str]:
+        return [form.format(float(np.median(of))) for of in values.values()]
+
+    def behind(values: Mapping[str, list[float]]) -> list[str]:
+        ours = values[""]
+        return ["", *(f"{sum(map(lt, values[name], ours))}/{len(ours)}" for name in names)]
+
+    body = [
+        ["held-out gap, median", *medians(gaps, "{:.2f}")],
+        ["held-out gap at most 1.2", *shares(gaps, LARGEST_GAP)],
+        ["a smaller gap than impactcell's", *behind(gaps)],
+        ["error of the force, median", *medians(errors, "{:.1%}")],
+        ["error at most 5 % of its size", *shares(errors, LARGEST_ERROR)],
+        ["a smaller error than impactcell's", *behind(errors)],
+        ["processor time, median [s]", *medians(seconds, "{:.1f}")],
+    ]
+    note = (
+        f"{len(compared)} campaigns of the table above, all in whose place the rivals know the covariates; "
+        f"gap of the nominal model {nominal:.2f} in the median. Error of the force along the motion, at all "
+        f"rows of the smoothed training shots where it acts, in {len(judged)} of which the truth is a "
+        "function; without a law it counts as 100 %. They get what the nominal model leaves, smoothed "
+        "(`_laws_rivals`)."
+    )
+    if "operon" not in names:
+        note += " Not installed: pyoperon."
+    columns = ("what", "impactcell", *(RIVALS[name] for name in names))
+    return [Table("Laws that nobody had listed: beside rivals", columns, body, note)]
+
+
 def tables() -> list[Table]:
     """Tables of what was gathered."""
     if not ROWS.exists():
@@ -209,7 +262,7 @@ def tables() -> list[Table]:
         "own plant; the effect itself is not in the library. Campaigns that another effect of the library "
         f"explained ({explained}) are not in the first three rows. Faster taps: of {len(faster)} laws the "
         f"covariate of {len(within)} stays within the range; the median gap of the others is "
-        f"{_median_gap(faster)}. Not measured: rivals, real records."
+        f"{_median_gap(faster)}."
     )
     detail = []
     for item in (*FUNCTIONS, *OTHERS, NONE):
@@ -244,6 +297,7 @@ def tables() -> list[Table]:
             "Laws that nobody had listed: bars", ("what", "bar", "measured", "95 % interval"), summary, note
         ),
         Table("Laws that nobody had listed: what was hidden", columns, detail),
+        *rivals_table(rows),
         *pair_table(),
         *null_table(),
     ]

@@ -60,9 +60,8 @@ class Constraints:
 
     def hold(self, names: tuple[str, ...], values: Samples) -> Samples:
         """Parameter vector of `names` with what is held at its value."""
-        for name, value in self.held.items():
-            if name in names:
-                values[names.index(name)] = value
+        for place, name in enumerate(names) if self.held else ():
+            values[place] = self.held.get(name, values[place])
         return values
 
     def penalty(self, coordinates: tuple[Coordinate, ...]) -> Samples:
