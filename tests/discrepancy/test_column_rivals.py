@@ -12,7 +12,9 @@ from impactcell.api.findings import write_findings
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
 from impactcell.records import Capture
-from tests.discrepancy.study import Job, campaign, strengths, with_column
+from simulator.campaign import make
+from simulator.campaign_scenario import CampaignScenario
+from tests.discrepancy.study import Job, campaign, recorded, strengths, with_column
 
 COLUMN = "oil temperature"
 FEW = ("friction_drift", "direction_asymmetry", "viscous_friction")
@@ -52,6 +54,31 @@ def test_what_rises_with_the_shots_as_a_drift_does_is_tied_with_it(tmp_path: Pat
     german = (tmp_path / "report.de.html").read_text()
     assert "die Spalte oil temperature in anderer Reihenfolge" in german
     assert "Reibung über der Spalte oil_temperature" in german
+
+
+@pytest.mark.slow
+def test_a_column_that_rises_with_the_shots_takes_no_name_by_what_a_curve_finds_in_their_scatter() -> None:
+    """A curve instead of a straight line had five numbers here, and left factors a quarter narrower."""
+    plan = CampaignScenario.model_validate(
+        {
+            "format": 1,
+            "seed": 8,
+            "plant": {"stiffness_n_per_m": 4e5, "damping_n_s_per_m": 300.0, "mu_s": 0.25, "ratio": 0.8},
+            "velocities_mm_per_min": [2500.0, 4000.0, 5500.0],
+            "masses_kg": [7.0, 8.5, 11.0],
+            "sensors": {
+                "force": {"rate_hz": 10000.0, "noise_std": 0.4},
+                "position": {"rate_hz": 10000.0, "noise_std": 1.5e-6},
+            },
+            "hide": ["friction_drift"],
+        }
+    )
+    rng = np.random.default_rng(2)
+    data = told(
+        recorded(plan, make(plan)[1]), lambda shot: 20.0 + 0.4 * shot.cycle + 0.3 * rng.standard_normal()
+    )
+    found = investigate(data, library=FEW)
+    assert (found.verdict, found.added) == ("tied", ("friction_drift",))
 
 
 def test_friction_that_goes_with_a_rising_temperature_is_no_drift() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from impactcell.discrepancy.data import decimate
 from impactcell.discrepancy.laws.covariates import visited
-from impactcell.discrepancy.laws.free_term import SMOOTHNESS, FreeTerm, free_forms_of
+from impactcell.discrepancy.laws.free_term import FreeTerm, free_forms_of
 from impactcell.discrepancy.laws.scored_model import score_fit, score_term
 from impactcell.discrepancy.laws.standing import SAMPLES
 from impactcell.discrepancy.laws.term_start import fit_free_term
@@ -39,6 +39,9 @@ from impactcell.physics import Kind
 from impactcell.physics.effects import LIBRARY
 from impactcell.records import Samples
 
+STRAIGHT = 1e6
+"""Weight of the roughness, over what the data know of the coefficients, at which a spline is a straight line:
+at 1 it bends with the scatter of some thirty shots, and takes an eighth of them for itself."""
 SAME = 1e-9
 """Share of a pattern that others leave up to which it is one of them but for rounding."""
 
@@ -148,10 +151,10 @@ def _lines(context: SearchContext, base: Fit, own: Container[str]) -> Iterator[F
         if span is None:
             continue
         try:
-            extended, fitted = fit_free_term(problem, base, form, span, SMOOTHNESS[-1])
+            extended, fitted = fit_free_term(problem, base, form, span, STRAIGHT)
         except DiscrepancyError:
             continue
-        yield FreeTerm(form, span, extended, fitted, SMOOTHNESS[-1], np.empty(0))
+        yield FreeTerm(form, span, extended, fitted, STRAIGHT, np.empty(0))
 
 
 def _without(context: SearchContext, selection: SelectionResult, effect: str, column: str) -> SelectionResult:

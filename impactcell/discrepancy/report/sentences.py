@@ -196,7 +196,8 @@ def _outdone(result: DiscrepancyResult) -> str:
     form = f"a free function s, {find_effect(outdone.form).equation},"
     if outdone.same_place:
         return f" {name} comes nearest, but {form} follows better in the same place: the law is another."
-    return f" {name} comes nearest, but {form} explains as much: it is not the cause."
+    more = "more" if find_effect(outdone.effect).kind is Kind.BETWEEN_SHOTS else "as much"
+    return f" {name} comes nearest, but {form} explains {more}: it is not the cause."
 
 
 def _conclusion(result: DiscrepancyResult) -> str:
