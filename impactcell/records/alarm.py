@@ -1,6 +1,7 @@
 """The conditions of a cell and their states."""
 
 import enum
+import math
 from dataclasses import dataclass, field
 
 LARGEST_STATISTIC = 1000.0
@@ -39,6 +40,11 @@ class Evidence:
     size_std: float = float("nan")
     false_alarm_cycles: float = float("nan")
     false_alarm_days: float = float("nan")
+
+    @property
+    def told_size(self) -> float:
+        """Size as it is told to people: nan where its standard deviation is infinite, and it says nothing."""
+        return float("nan") if math.isinf(self.size_std) else self.size
 
 
 @dataclass(frozen=True, slots=True)

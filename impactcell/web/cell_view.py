@@ -241,7 +241,7 @@ def alarm_content(cell: str, alarm: Alarm) -> dict[str, Any]:
         "evidence": {
             "compared": {language: Messages(language).compared(alarm) for language in LANGUAGES},
             "change_cycle": evidence.change_cycle or None,
-            "size": number(evidence.size),
+            "size": number(evidence.told_size),
             "size_std": number(evidence.size_std),
             "false_alarm_cycles": number(evidence.false_alarm_cycles),
         },

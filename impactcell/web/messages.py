@@ -30,6 +30,8 @@ LEAST_WHOLE = 9.95
 """From here on two significant digits are a whole number."""
 ADDED = " + "
 """Between the name of a model and the effects that were added to it."""
+UNSURE_DIGITS = 5
+"""Significant digits of a value beside which no standard deviation is known."""
 LARGE = 1e9
 """From here on a number is written with an exponent, in any unit."""
 
@@ -59,9 +61,13 @@ def _weight(entry: str) -> float:
         return 0.0
 
 
-def _told_decimals(std: float) -> int:
-    """Count the decimals that two significant digits of what is told of a standard deviation need."""
-    return max(1 - int(f"{TOLD_STDS * std:.1e}".partition("e")[2]), 0)
+def _told_decimals(std: float) -> int | None:
+    """Count the decimals that two significant digits of what is told of a standard deviation need.
+
+    None where it is not finite, and so nothing is told of it.
+    """
+    told = TOLD_STDS * std
+    return max(1 - int(f"{told:.1e}".partition("e")[2]), 0) if math.isfinite(told) else None
 
 
 class Messages:
@@ -216,17 +222,20 @@ class Messages:
         >>> Messages("en").told_std(0.001)
         '0.0020'
         """
-        told = TOLD_STDS * std
-        text = f"{told:.{_told_decimals(std)}f}" if told < LEAST_WHOLE else self.number(told, 2)
+        told, decimals = TOLD_STDS * std, _told_decimals(std)
+        if decimals is None:
+            return "–"
+        text = f"{told:.{decimals}f}" if told < LEAST_WHOLE else self.number(told, 2)
         return text.replace(".", ",") if self.language == "de" else text
 
     def beside_std(self, value: float, std: float) -> str:
-        """Write a value with as many decimals as stand behind its "±".
+        """Write a value with as many decimals as stand behind its "±", if that is known.
 
         >>> Messages("de").beside_std(0.56, 0.00055)
         '0,5600'
         """
-        text = f"{value:.{_told_decimals(std)}f}"
+        decimals = _told_decimals(std)
+        text = self.number(value, UNSURE_DIGITS) if decimals is None else f"{value:.{decimals}f}"
         return text.replace(".", ",") if self.language == "de" else text
 
     def for_script(self) -> dict[str, str]:

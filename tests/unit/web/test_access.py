@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from impactcell.alarms import EventKind
+from impactcell.alarms import RULES, EventKind
 from impactcell.records import Evidence, Shelving
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.scada import Role
@@ -363,10 +363,32 @@ async def test_the_evidence_of_an_alarm_is_one_row_of_facts(page: Page) -> None:
     for evidence, said in (
         (whole, "Evidence 12.2, alarm above 11, since cycle 70, size 0.0903 ± 0.0056"),
         (replace(whole, statistic=math.nan), "since cycle 70, size 0.0903 ± 0.0056"),
+        (replace(whole, size_std=math.inf), "Evidence 12.2, alarm above 11, since cycle 70"),
     ):
         await put(page, CellNews(CELL, alarms=(replace(raised(evidence=evidence), name="DeviantCycle"),)))
         async with page.logged_in(Role.OBSERVER) as client:
             assert f"500. {said}</p>" in (await client.get("/alarms?lang=en")).text
+
+
+@pytest.mark.parametrize("figure", [math.inf, -math.inf, math.nan, 0.0, 5e-324, 1e308])
+async def test_an_alarm_is_shown_whatever_figures_it_has(page: Page, figure: float) -> None:
+    alarms = [
+        replace(raised(evidence=replace(evidence, **{name: figure})), name=rule)
+        for rule in RULES
+        for evidence in (Evidence(), Evidence(0.99, 0.9, 7, 0.1, 0.01))
+        for name in ("statistic", "threshold", "size", "size_std")
+    ]
+    async with page.logged_in(Role.OPERATOR) as client:
+        for alarm in alarms:
+            await put(page, CellNews(CELL, alarms=(alarm,)))
+            assert alarm_content(CELL, alarm)
+            assert f'id="alarm-{CELL}-{alarm.name}"' in (await client.get("/alarms/rows")).text, alarm
+
+
+def test_a_size_that_nothing_is_known_of_is_told_nowhere() -> None:
+    """A cycle may be unlike the others over the whole slide, with no place and so no size that counts."""
+    deviant = raised(evidence=Evidence(12.25, 11.0, 70, 0.0903, math.inf))
+    assert alarm_content(CELL, deviant)["evidence"]["size"] is None
 
 
 @pytest.mark.parametrize("path", ["/", "/alarms", "/studies", "/system", "/nothing"])

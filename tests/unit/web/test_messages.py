@@ -1,5 +1,6 @@
 """One catalogue: every text in every language, every text in use, every use with a text."""
 
+import math
 import re
 from pathlib import Path
 
@@ -148,3 +149,10 @@ def test_what_was_found_is_said_in_german(change: dict[str, object], said: str) 
     assert Messages("en").headline(result) == "Missing: quadratic drag."
     assert Messages("en").advice(FOUND["effects"][0]) == ("m", "l")  # type: ignore[index]
     assert "Flüssigkeit" in Messages("de").advice(FOUND["effects"][0])[1]  # type: ignore[index]
+
+
+@pytest.mark.parametrize("std", [math.inf, math.nan, 1e308])
+def test_a_value_stands_alone_where_what_stands_behind_it_is_not_known(std: float) -> None:
+    assert Messages("en").beside_std(0.1234567, std) == "0.12346"
+    assert Messages("de").beside_std(0.1234567, std) == "0,12346"
+    assert Messages("en").told_std(std) == "–"
