@@ -19,6 +19,7 @@ from impactcell.positioning.task_state_machine import TaskOutcome
 from impactcell.process.cell_logger import CellLogger
 from impactcell.process.condition_log import ConditionLog
 from impactcell.records import (
+    NOT_CONNECTED_YET,
     BatchAnnouncement,
     Evidence,
     ModuleStatus,
@@ -292,3 +293,5 @@ class CellTask:
         if self.worker.snapshot is not None:
             self._publisher.publish(self.worker.snapshot)
             self._publisher.mark_stale(self.worker.snapshot.time_ns)
+        if self.status.reason == NOT_CONNECTED_YET:
+            self._publisher.publish_start()

@@ -22,7 +22,6 @@ from prometheus_client.registry import Collector, CollectorRegistry
 from impactcell.alarms import RULES
 from impactcell.alarms.rules import journal_fault
 from impactcell.errors import SettingsError
-from impactcell.records import NOT_CONNECTED_YET
 
 log = logging.getLogger(__name__)
 
@@ -67,7 +66,7 @@ def waiting_cell(cell: str) -> CellHealth:
         mu_s=math.nan,
         wear_level=math.nan,
         alarms={name: name == journal_fault.NAME for name in RULES},
-        link_fault=NOT_CONNECTED_YET,
+        link_fault="not connected yet",
         journal_fault="the journal cannot be opened; the cell waits for it",
     )
 

@@ -95,6 +95,10 @@ class CellPublisher:
             self._log.log(level, message, alarm.name, alarm.message, cycle=alarm.cycle or None)
         (self._active.add if alarm.active else self._active.discard)(alarm.name)
 
+    def publish_start(self) -> None:
+        """Show that nothing has been tried yet: no value is of now, and no link is lost."""
+        self._put(freshness=Freshness.STARTING)
+
     def mark_stale(self, time_ns: int) -> None:
         """Show that the values are of another time."""
         self._put(freshness=Freshness.STALE)

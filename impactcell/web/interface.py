@@ -15,6 +15,7 @@ from impactcell.scada import Actor, ConditionAction
 class Freshness(enum.Enum):
     """Whether the values of a cell are of now."""
 
+    STARTING = "starting"
     LIVE = "live"
     STALE = "stale"
     LOST = "lost"

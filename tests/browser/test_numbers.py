@@ -14,7 +14,7 @@ from impactcell.alarms.rules import batch_shift
 from impactcell.records import Evidence
 from impactcell.records.uncertainty import TOLD_STDS
 from impactcell.web.cell_view import CellView
-from impactcell.web.interface import CellNews
+from impactcell.web.interface import CellNews, Freshness
 from impactcell.web.messages import Messages
 from tests.browser.chromium import Browser
 from tests.snapshots import make_capture, make_snapshot
@@ -44,7 +44,7 @@ def load(browser: Browser, language: str) -> None:
     code = re.sub(r"^import .*|^export ", "", SCRIPT.read_text(), flags=re.MULTILINE)
     texts = Messages(language).for_script()
     browser.open("about:blank")
-    offered = "Object.assign(window, { showValues, showFriction, cyclesLeft, showAlarm });"
+    offered = "Object.assign(window, { showValues, showState, showFriction, cyclesLeft, showAlarm });"
     browser.run(LOAD, f"{code}\n{offered}", language, json.dumps(texts), TOLD_STDS)
 
 
@@ -163,6 +163,25 @@ def test_the_number_of_a_cycle_is_written_as_in_the_text_of_an_alarm(browser: Br
     assert browser.run(SHOW, "Batch/LastShiftCycle", "cycle", content) == "1234567"
     large = card(Friction__SlidingDistance=98765.4, Friction__SlidingDistanceStdDev=60.0)
     assert browser.run(SHOW, "Friction/SlidingDistance", "", large) == "98765 ± 120"
+
+
+@pytest.mark.parametrize(
+    ("language", "said"),
+    [("en", "○ starting: compiling for this machine"), ("de", "○ startet: übersetzt für diese Maschine")],
+)
+def test_a_module_that_was_not_asked_yet_is_not_told_in_red(
+    browser: Browser, language: str, said: str
+) -> None:
+    load(browser, language)
+    view = CellView("press-1")
+    view.take(CellNews("press-1", freshness=Freshness.STARTING))
+    script = """
+        const root = document.createElement("div");
+        root.innerHTML = '<b data-field="state"></b>';
+        showState(root, JSON.parse(arguments[0]));
+        return [root.textContent, root.firstChild.className];
+    """
+    assert browser.run(script, view.encode("card").decode()) == [said, "state plain"]
 
 
 def test_cycles_left_are_not_said_where_wear_is_not_known(browser: Browser) -> None:

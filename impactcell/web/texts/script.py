@@ -7,6 +7,7 @@ SCRIPT_TEXTS: Texts = {
     "live_upload_broke": ("the connection broke off", "die Verbindung brach ab"),
     "live_upload_refused": ("It was not taken; try again later.", "Nicht angenommen; bitte später."),
     "live_no_files": ("Choose files, or drop them here.", "Bitte Dateien wählen oder hier ablegen."),
+    "live_starting": ("starting: compiling for this machine", "startet: übersetzt für diese Maschine"),
     "live_live": ("live", "live"),
     "live_stale": ("no new cycle", "kein neuer Zyklus"),
     "live_lost": ("no connection to the module", "keine Verbindung zum Modul"),

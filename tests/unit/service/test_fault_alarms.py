@@ -171,6 +171,24 @@ async def test_a_start_of_the_service_is_no_fault_of_the_link(
     assert [a.active for a in await transitions(task, tmp_path, name)] == [True]
 
 
+@pytest.mark.parametrize("task", [False], indirect=True)
+async def test_a_module_that_was_not_asked_yet_is_not_told_to_be_lost(task: CellTask) -> None:
+    """The page said so in red for the minutes that a new machine compiles for."""
+    feed = LiveFeed([task.cell.name])
+    task._publisher.feed = feed
+    task._publish_restored()
+    card = feed.views[task.cell.name].card()
+    assert card["freshness"] == "starting"
+    assert card["link_reason"]["en"] == task.health.reason
+    assert "compiling for this machine" in task.health.reason
+    assert "übersetzt für diese Maschine" in card["link_reason"]["de"]
+    task._module._report_link(connected=False, reason=SILENT)
+    assert feed.views[task.cell.name].card()["freshness"] == "lost"
+    assert task.health.reason == SILENT
+    task._publish_restored()  # begun anew after a fault
+    assert feed.views[task.cell.name].card()["freshness"] == "lost"
+
+
 class Shown:
     """What OPC UA clients are told of all values of a cell."""
 
