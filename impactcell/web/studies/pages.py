@@ -16,6 +16,7 @@ from impactcell.web.requests import CSRF_FIELD, RequestRefusedError
 from impactcell.web.sessions import BrowserSession
 from impactcell.web.studies.queue import PROGRAM_FAULT, is_choice
 from impactcell.web.studies.study import Acceptance, Goal, Stage, Study
+from impactcell.web.studies.two_values import differing_parameters
 from impactcell.web.studies.upload import KINDS, MAX_FILES, receive, safe_name
 
 _log: Final = logging.getLogger(__name__)
@@ -145,6 +146,7 @@ def _rendered(context: PageContext, request: Request, session: BrowserSession, t
         study=shown,
         place=context.studies.place(shown),
         may_accept=may_accept,
+        differing=differing_parameters(shown.result, shown.changes),
         report=REPORTS.get(_report_language(context, request, shown), ""),
     )
 

@@ -66,6 +66,14 @@ STUDY_TEXTS: Texts = {
     "parameter": ("Parameter", "Parameter"),
     "before": ("Now", "Jetzt"),
     "after": ("Then", "Dann"),
+    "then_differs": (
+        ("“Outcome” has another value, which is to be believed: it was fitted beside a form of what remains. "
+         "This model has none, so its value takes up a part of that, and its interval does not hold beside "
+         "a model error of {level} noise floors."),
+        ("Im „Ergebnis“ steht ein anderer Wert, und der gilt: er wurde neben einer Form dessen angepasst, "
+         "was bleibt. Dieses Modell hat keine; sein Wert nimmt einen Teil davon auf, und sein Bereich gilt "
+         "neben einem Modellfehler von {level} Rauschpegeln nicht."),
+    ),
     "accept_help": (
         "The model is calibrated first. The cell takes it from the next cycle on: wear and alarms stay.",
         "Das Modell wird erst kalibriert. Die Zelle nimmt es ab dem nächsten Zyklus; Gelerntes bleibt.",

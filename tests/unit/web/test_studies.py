@@ -818,6 +818,48 @@ async def test_parameters_are_said_in_words_with_their_unit(page: Page) -> None:
     assert names == ["µs", "Steifigkeit [N/m]", "Viskose Reibung: viskoser Koeffizient [N s/m]"]
 
 
+@pytest.mark.parametrize(
+    ("after", "ci95", "explained", "differs"),
+    [
+        (2921.65, [2694.53, 3148.74], False, True),
+        (2921.65, [2694.53, 3148.74], True, False),
+        (2600.0, [2400.0, 2800.0], False, False),
+        (2921.65, None, False, True),
+        (2500.5, None, False, False),
+        (2921.65, [None, 3148.74], False, False),
+    ],
+)
+async def test_of_two_values_of_a_parameter_one_is_said_to_be_believed(
+    page: Page, after: float, ci95: list[float | None] | None, explained: bool, differs: bool
+) -> None:
+    """A drag was 2500, the contact another, too: 2499.9 came out, and 2921.7 stood beside *Accept*."""
+    drag = {"drag_coefficient_n_s2_per_m2": {"value": 2499.94, "ci95": [2498.85, 2501.4]}}
+    factors = {"factor_change": {"value": [0.1, 0.2], "ci95": [[0.0, 0.2], [0.1, 0.3]]}}
+    changes = [
+        {"parameter": "mu_k", "before": 0.2, "after": 0.21, "ci95": None},
+        {"parameter": "quadratic_drag.drag_coefficient_n_s2_per_m2", "before": None, "after": after},
+        {"parameter": "batch_effect.factor_change", "before": None, "after": [0.1, 0.2]},
+    ]
+    changes[1]["ci95"] = ci95
+    async with page.logged_in(Role.OBSERVER) as client:
+        study = page.studies.store.begin("own-drag.zip", "otto", CELL)
+        effects = [
+            {"effect": "quadratic_drag", "parameters": drag},
+            {"effect": "batch_effect", "parameters": factors},
+        ]
+        remaining = {"explained": explained, "model_error": {"level": 7.1899}}
+        study.stage, study.result = Stage.DONE, RESULT | {"effects": effects, "remaining": remaining}
+        study.changes = CHANGES | {"changes": changes, "after": "rail + quadratic_drag"}
+        shown = {code: (await client.get(f"/studies/{study.id}?lang={code}")).text for code in ("en", "de")}
+    said = {
+        "en": "Quadratic drag: drag coefficient [N s²/m²]: “Outcome” has another value, which is to be",
+        "de": "[N s²/m²]: Im „Ergebnis“ steht ein anderer Wert, und der gilt",
+    }
+    for language, level in (("en", "model error of 7.2 noise"), ("de", "Modellfehler von 7,2 Rausch")):
+        assert (said[language] in shown[language]) is differs
+        assert (level in shown[language]) is differs
+
+
 async def test_a_report_can_do_nothing(page: Page) -> None:
     async with page.logged_in(Role.OBSERVER) as client:
         store = page.studies.store
