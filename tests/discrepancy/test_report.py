@@ -6,19 +6,23 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlparse
 
+import numpy as np
 import pytest
 
-from impactcell.discrepancy.model import ParameterEstimate
+from impactcell.discrepancy.model import ParameterEstimate, Problem
 from impactcell.discrepancy.report import figures, sentences
 from impactcell.discrepancy.report.page import (
+    SENTENCES,
     format_number,
     page_context,
+    report_environment,
     write_report,
 )
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.report.sentences import headline, phrase
 from impactcell.discrepancy.search.conclusion import Place, Remaining
 from impactcell.discrepancy.workflow import DiscrepancyResult
+from impactcell.german.findings import REPORTS
 from impactcell.physics.effect_names import as_title
 from impactcell.physics.effects import LIBRARY
 from tests.discrepancy.test_workflow import investigated
@@ -146,6 +150,42 @@ def test_noise_alone_is_drawn_thin(tied: DiscrepancyResult, monkeypatch: pytest.
         low, high = axes.get_ylim()
         assert high - low >= 5.0 * noise
         assert all(low <= value <= high for line in axes.lines for value in line.get_ydata())
+
+
+@pytest.mark.parametrize(("held_out", "shown"), [(1, 1), (2, 2), (3, 3), (4, 3)])
+def test_each_held_out_shot_is_drawn_once(
+    tied: DiscrepancyResult, monkeypatch: pytest.MonkeyPatch, held_out: int, shown: int
+) -> None:
+    drawn: list[Any] = []
+    problem = tied.held_problem
+    assert len(problem.shots.items) >= held_out
+    samples = slice(0, int(problem.shots.bounds[held_out]))
+    few = replace(
+        tied,
+        held_problem=Problem(problem.shots.select(np.arange(held_out)), problem.batches, problem.effects),
+        held_nominal=replace(tied.held_nominal, residual=tied.held_nominal.residual[samples]),
+        held_final=replace(tied.held_final, residual=tied.held_final.residual[samples]),
+    )
+    monkeypatch.setattr(figures, "svg", lambda figure, _said: drawn.append(figure) or "")
+    figures.trace_figure(few, sentences)
+    titles = [axes.get_title() for axes in drawn[0].axes if axes.get_title()]
+    assert len(titles) == len(set(titles)) == shown
+
+
+@pytest.mark.parametrize(
+    ("held_out", "english", "german"),
+    [
+        (1, "The only one that was held out.", "Der einzige zurückgehaltene."),
+        (2, "Both, the one that the nominal model", "Beide, der vom Ausgangsmodell besser"),
+        (3, "The best, the median and the worst", "Der vom Ausgangsmodell am besten, der im Median"),
+    ],
+)
+def test_what_is_drawn_of_held_out_shots_is_said(
+    tied: DiscrepancyResult, held_out: int, english: str, german: str
+) -> None:
+    for language, said in (("en", english), ("de", german)):
+        template = report_environment(SENTENCES[language]).get_template(f"{REPORTS[language]}.j2")
+        assert said in template.render(page_context(tied, "a campaign", language) | {"held_out": held_out})
 
 
 def test_a_tie_is_told_in_the_sentence(tied: DiscrepancyResult) -> None:

@@ -110,7 +110,7 @@ def _column(name: str, said: ModuleType) -> str:
 
 
 def trace_figure(result: DiscrepancyResult, said: ModuleType) -> str:
-    """Three held-out shots, slow to fast: measured and modelled, and the residuals before and after."""
+    """Held-out shots, the best to the worst explained: measured and modelled, residuals before and after."""
     problem = result.held_problem
     shots = problem.shots
     nominal_fit, extended_fit = result.held_nominal, result.held_final
@@ -122,14 +122,18 @@ def trace_figure(result: DiscrepancyResult, said: ModuleType) -> str:
     )
     misfit = nominal_fit.misfit(shots) / problem.sizes
     missed = shots.unwhiten(extended_fit.residual)
-    order = np.argsort(misfit)
-    chosen = [int(order[0]), int(order[len(order) // 2]), int(order[-1])]
+    order = [int(place) for place in np.argsort(misfit)]
+    chosen = list(dict.fromkeys((order[0], order[len(order) // 2], order[-1])))
     channels = [number for number in range(3) if (shots.channel == number).any()]
     times, is_weighed = shots.times, not result.prepared.lacks_mass
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.5, 2.4 * len(channels) * 1.15))
         grid = figure.add_gridspec(
-            2 * len(channels), 3, height_ratios=[2.2, 1.0] * len(channels), hspace=0.28, wspace=0.22
+            2 * len(channels),
+            len(chosen),
+            height_ratios=[2.2, 1.0] * len(channels),
+            hspace=0.28,
+            wspace=0.22,
         )
         for column, shot in enumerate(chosen):
             part = shots.samples_of(shot)
