@@ -199,12 +199,15 @@ def discrepancy(
     test: Annotated[
         str | None, typer.Option(metavar="GLOB", help="With --base: shots or batches that are held out.")
     ] = None,
+    title: Annotated[
+        str, typer.Option(metavar="TEXT", help="What the report calls it, in place of the campaign's name.")
+    ] = "",
     as_json: AsJson = False,
 ) -> None:
     """Find where model and measurement disagree, name the missing effect, prove it.
 
-    Of CAMPAIGN and `--journal` one is named. With `--base` only CAMPAIGN, `--train`, `--test`, `--seed` and
-    `--json` go; `--train` and `--test` go only with it.
+    Of CAMPAIGN and `--journal` one is named. With `--base` only CAMPAIGN, `--train`, `--test`, `--seed`,
+    `--title` and `--json` go; `--train` and `--test` go only with it.
     """
     from impactcell.cli.discrepancy import discrepancy as run_discrepancy
     from impactcell.cli.discrepancy import discrepancy_of_machine
@@ -213,14 +216,23 @@ def discrepancy(
 
     if base is not None:
         if campaign is None or journal or cell or scheduler is not None or effects:
-            raise CampaignError("--base goes with a campaign, --train, --test and --seed alone")
-        discrepancy_of_machine(campaign, output, base, patterns=(train, test), seed=seed, as_json=as_json)
+            raise CampaignError("--base goes with a campaign, --train, --test, --seed and --title alone")
+        discrepancy_of_machine(
+            campaign, output, base, patterns=(train, test), seed=seed, title=title, as_json=as_json
+        )
         return
     if train is not None or test is not None:
         raise CampaignError("--train and --test go with --base; without it the seed divides the shots")
     offer(effects or ())
     run_discrepancy(
-        campaign, output, cell=cell, journal=journal, seed=seed, scheduler=scheduler, as_json=as_json
+        campaign,
+        output,
+        cell=cell,
+        journal=journal,
+        seed=seed,
+        scheduler=scheduler,
+        title=title,
+        as_json=as_json,
     )
 
 

@@ -37,6 +37,7 @@ def discrepancy(
     journal: Path | None = None,
     seed: int = 0,
     scheduler: str | None = None,
+    title: str = "",
     as_json: bool = False,
 ) -> None:
     """Run the discrepancy workflow and write result.json, model.extended.yaml and report.html.
@@ -56,6 +57,8 @@ def discrepancy(
         The same data and seed give the same result to the byte.
     scheduler : str, optional
         Address of a dask scheduler that is to do the fits.
+    title : str, optional
+        What the report calls it; the name of the campaign or the journal where it is not given.
     as_json : bool
         Print result.json instead of its verdict.
 
@@ -74,14 +77,14 @@ def discrepancy(
     if model is None and journal is not None:
         model = _recording_model(journal)
     plant = None if model is None else model.plant
-    source, data = _read(campaign, journal, plant, config)
+    name, data = _read(campaign, journal, plant, config)
     with named_steps() as report_step, _mapper(scheduler) as mapper:
         with naming(campaign or journal):
             result = investigate(
                 data, seed=seed, mapper=mapper, plant=plant, limits=_limits(config), progress=report_step
             )
         report_step("writing the report")
-        write_findings(result, data, output, source, model)
+        write_findings(result, data, output, title or name, model)
     _print_outcome(output, headline(result), as_json=as_json)
 
 
@@ -92,6 +95,7 @@ def discrepancy_of_machine(
     *,
     patterns: tuple[str | None, str | None] = (None, None),
     seed: int = 0,
+    title: str = "",
     as_json: bool = False,
 ) -> None:
     """Run the workflow with a base model, on a machine that is no cell.
@@ -103,6 +107,8 @@ def discrepancy_of_machine(
     patterns : tuple of str or None
         Shots that fit and shots that test, by number or batch.
     seed : int
+    title : str, optional
+        What the report calls it; the campaign's name where it is not given.
     as_json : bool
         Print result.json instead of its verdict.
 
@@ -118,7 +124,7 @@ def discrepancy_of_machine(
         with naming(campaign):
             finding = investigate_with_base(data, base, patterns, seed)
         report_step("writing the report")
-        write_machine_findings(finding, data, output, str(campaign.name))
+        write_machine_findings(finding, data, output, title or str(campaign.name))
     _print_outcome(output, machine_headline(finding), as_json=as_json)
 
 

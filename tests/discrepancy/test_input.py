@@ -104,7 +104,7 @@ def test_what_does_not_go_with_a_base_model_is_refused(tmp_path: Path, besides: 
     given = ["discrepancy", str(tmp_path), "--base", "base.yaml", "-o", str(tmp_path / "out"), *besides]
     refused = CliRunner().invoke(app, given).exception
     assert isinstance(refused, CampaignError)
-    assert str(refused) == "--base goes with a campaign, --train, --test and --seed alone"
+    assert str(refused) == "--base goes with a campaign, --train, --test, --seed and --title alone"
 
 
 @pytest.mark.parametrize("besides", [[], ["--base", "base.yaml"]])

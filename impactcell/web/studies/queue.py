@@ -161,7 +161,8 @@ class StudyQueue:
             overview = await asyncio.to_thread(friction_overview, table)
             study.result = overview | {"messages": list(outcome.messages)}
         else:
-            arguments = ["discrepancy", campaign, "-o", str(results), "--json", *against]
+            told = f"--title={study.title}"
+            arguments = ["discrepancy", campaign, "-o", str(results), "--json", told, *against]
             result = study.result = _json((await self._verb(study, arguments)).output)
             if cell is not None and result.get("effects"):  # what it found is shown meanwhile
                 extended = str(results / result["model"])

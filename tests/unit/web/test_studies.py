@@ -150,7 +150,11 @@ async def test_a_campaign_is_dropped_confirmed_and_studied(page: Page, verbs: Ve
         found = await until(page, study, Stage.DONE)
         text = (await client.get(f"/studies/{study}")).text
     assert [arguments[0] for arguments in verbs.asked] == ["discrepancy", "model"]
-    assert verbs.asked[0][-2:] == ["--cell", str(page.users.parent / "press-1.yaml")]
+    assert verbs.asked[0][-3:] == [
+        "--title=shots.zip",
+        "--cell",
+        str(page.users.parent / "press-1.yaml"),
+    ]
     assert [name for name, _ in found.steps] == [
         "discrepancy",
         "doing discrepancy",
