@@ -15,7 +15,7 @@ from impactcell.cell.series_replay import RaisedAlarm, TrackedSeries, replay
 from impactcell.cli.series_file import COLUMNS, SeriesFile, read_series
 from impactcell.errors import SeriesError
 from impactcell.process.console import print_note
-from impactcell.records.uncertainty import TOLD_STDS, plus_minus
+from impactcell.records.uncertainty import TOLD_STDS, plus_minus, told_cycles_left
 from impactcell.settings.plausible_tap import FRICTION
 from impactcell.tracking.wear_batch import BatchKnowledge, TrackerSettings
 from impactcell.tracking.wear_batch.input_validation import LARGEST_FRICTION
@@ -142,10 +142,6 @@ def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _cycles(count: float) -> str:
-    return f"{count:.0f}" if math.isfinite(count) else "never"
-
-
 def _as_text(series: TrackedSeries, *, is_told: bool) -> str:
     wear = series.wear
     has_other = is_told or _has_other_batch(series)
@@ -159,10 +155,8 @@ def _as_text(series: TrackedSeries, *, is_told: bool) -> str:
         f"wear    {rate} per 1000 cycles",
     ]
     if math.isfinite(wear.limit):
-        left, low, high = map(
-            _cycles, (wear.cycles_to_limit, wear.cycles_to_limit_low, wear.cycles_to_limit_high)
-        )
-        lines.append(f"limit   {wear.limit:g}, cycles to it: {left}, 95 %: {low} .. {high}")
+        left = wear.cycles_to_limit, wear.cycles_to_limit_low, wear.cycles_to_limit_high
+        lines.append(f"limit   {wear.limit:g}, cycles to it: {told_cycles_left(*left, '{}, 95 %: {} .. {}')}")
     lines.extend(_alarm_line(raised, series) for raised in series.alarms)
     return "\n".join([*lines, *_note_lines(series.notes)])
 

@@ -13,7 +13,7 @@ from rich.text import Text
 from impactcell.demo.alarm_lines import alarms_within, whole_alarms
 from impactcell.demo.chart import LEGEND, QUALITY_STYLE, chart
 from impactcell.records import Coefficient, Estimator, Snapshot
-from impactcell.records.uncertainty import plus_minus
+from impactcell.records.uncertainty import plus_minus, told_cycles_left
 
 WIDE = 100
 """Columns from which on facts stand side by side and alarms in a table."""
@@ -163,12 +163,8 @@ def _limit(snapshot: Snapshot) -> str:
         return f"{wear.limit:.3f}, not in sight"
     if wear.cycles_to_limit < 0.5:
         return f"{wear.limit:.3f}, passed"
-    between = f"{_count(wear.cycles_to_limit_low)} to {_count(wear.cycles_to_limit_high)}"
-    return f"{wear.limit:.3f} in {wear.cycles_to_limit:.0f} ({between}) cycles"
-
-
-def _count(cycles: float) -> str:
-    return "never" if math.isinf(cycles) else f"{cycles:.0f}"
+    left = wear.cycles_to_limit, wear.cycles_to_limit_low, wear.cycles_to_limit_high
+    return f"{wear.limit:.3f} in {told_cycles_left(*left, '{} ({} to {})')} cycles"
 
 
 def _batch(snapshot: Snapshot) -> Text:

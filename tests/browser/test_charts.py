@@ -125,6 +125,15 @@ def test_the_labels_of_an_axis_have_as_many_decimals_as_its_steps(charts: Browse
         assert len(set(labels)) == len(labels) > 2
 
 
+@pytest.mark.parametrize("value", [0.0, 0.05, 0.25, 18.5, 3000.0])
+def test_one_value_alone_has_labels_that_fit(charts: Browser, value: float) -> None:
+    """A limit without any friction beside it had labels of twelve digits, of which the last were seen."""
+    data = [[0, 1], [value, value], [value, value]]
+    _, labels = charts.driver.execute_async_script(LABELS, 600, data, {})
+    assert len(set(labels)) == len(labels) > 1
+    assert max(map(len, labels)) <= 7
+
+
 WORD = """
     const [curve, marks, done] = arguments;
     chart.show([curve.map((_, x) => x), curve, curve, curve], marks);

@@ -12,7 +12,7 @@ import impactcell.web
 from impactcell.alarms.rule import CycleInputs, RuleContext
 from impactcell.alarms.rules import batch_shift
 from impactcell.records import Evidence
-from impactcell.records.uncertainty import TOLD_STDS
+from impactcell.records.uncertainty import TOLD_STDS, told_cycles
 from impactcell.web.cell_view import CellView
 from impactcell.web.interface import CellNews, Freshness
 from impactcell.web.messages import Messages
@@ -114,9 +114,10 @@ def test_cycles_that_are_left_are_whole_ones_and_the_same_everywhere(browser: Br
         Wear__CyclesToLimitLow=987.6,
         Wear__CyclesToLimitHigh=12345.6,
     )
+    assert [told_cycles(count) for count in (1234.9, 987.6, 12345.6)] == ["1230", "987", "12300"]
     said = browser.run("return cyclesLeft(arguments[0])", content["values"])
-    assert said == "1234 (from 987 to 12345)"
-    for path, part in (("", "1234"), ("Low", "987"), ("High", "12345")):
+    assert said == "1230 (from 987 to 12300)"
+    for path, part in (("", "1230"), ("Low", "987"), ("High", "12300")):
         assert browser.run(SHOW, f"Wear/CyclesToLimit{path}", "cycles", content) == part
 
 
@@ -194,16 +195,21 @@ def test_cycles_left_are_not_said_where_wear_is_not_known(browser: Browser) -> N
 
 
 @pytest.mark.parametrize(
-    ("language", "said"),
-    [("en", ("316 (from 49 to never)", "never")), ("de", ("316 (von 49 bis nie)", "nie"))],
+    ("language", "left", "low", "said"),
+    [
+        ("en", 316.0, 49.0, ("more than 49", "never")),
+        ("de", 316.0, 49.0, ("mehr als 49", "nie")),
+        ("en", 170570000.0, 32224.7, ("more than 32200", "never")),
+        ("en", 316.0, 0.4, ("316 (from 0 to never)", "never")),
+    ],
 )
 def test_a_limit_that_is_perhaps_never_reached_is_said_to_be(
-    browser: Browser, language: str, said: tuple[str, str]
+    browser: Browser, language: str, left: float, low: float, said: tuple[str, str]
 ) -> None:
-    """The sign for what is not known stood there."""
+    """The middle of what has no end says nothing: "170570000 (from 32224 to never)" stood there."""
     load(browser, language)
     snapshot = make_snapshot(make_capture())
-    wear = replace(snapshot.wear, level=0.2, limit=0.25, cycles_to_limit=316.0, cycles_to_limit_low=49.0)
+    wear = replace(snapshot.wear, level=0.2, limit=0.25, cycles_to_limit=left, cycles_to_limit_low=low)
     view = CellView("press-1")
     view.take(CellNews("press-1", replace(snapshot, wear=wear)))
     sent = view.encode("card").decode()

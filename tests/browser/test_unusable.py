@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import pytest_asyncio
 
+from impactcell.journal.store import Journal
 from impactcell.records import Coefficient, Estimator, ModuleStatus, PositioningState, Quality, Snapshot
 from impactcell.scada import Role
 from impactcell.scada.users import User, write_users
@@ -55,9 +56,11 @@ async def server(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Page
     (directory / "studies").write_text("no directory: nothing can be stored in it")
     settings = PageSettings("http://127.0.0.1:0", users, directory / "pki", directory / "studies")
     cells = [
-        CellFacts(name, "10.0.0.9:502", "", has_positioning=name == PLACING) for name in (UNKNOWN, PLACING)
+        CellFacts(UNKNOWN, "10.0.0.9:502", "", directory / "unknown.sqlite"),
+        CellFacts(PLACING, "10.0.0.9:502", "", has_positioning=True),
+        CellFacts(SILENT, "10.0.0.8:502", ""),
     ]
-    server = PageServer(settings, [*cells, CellFacts(SILENT, "10.0.0.8:502", "")], Backend(users))
+    server = PageServer(settings, cells, Backend(users))
     server.start()
     connected, lost = (
         ModuleStatus(connected=True),
@@ -68,6 +71,8 @@ async def server(tmp_path_factory: pytest.TempPathFactory) -> AsyncIterator[Page
         summary = replace(capture, force=None, position=None)
         snapshot = replace(make_snapshot(capture), time_ns=time.time_ns())
         task = PositioningState(0.0125, 0.004 / cycle, 0.05, 0.0015, running=True, taps=cycle)
+        with Journal(directory / "unknown.sqlite", UNKNOWN) as journal:
+            journal.append(replace(summary, time_ns=snapshot.time_ns), unknown(snapshot), b"", ())
         server.feed.put(CellNews(UNKNOWN, unknown(snapshot), summary, connected, freshness=Freshness.LIVE))
         placing = replace(snapshot, positioning=task)
         server.feed.put(CellNews(PLACING, placing, capture, status=connected, freshness=Freshness.STALE))
@@ -96,6 +101,7 @@ async def test_what_is_not_known_is_a_dash_and_says_why(
         browser.open(f"{server.endpoint}/cells/{UNKNOWN}")
         browser.find("[data-cycle]")
         browser.until(lambda: browser.find("#signature").text == "in diesem Zyklus nicht aufgezeichnet")
+        browser.until(lambda: browser.find("#trend").text == "keine verwendbare Reibung in dieser Zeit")
         assert browser.find("[data-field=wear_reason]").text == "µs fehlt, der Zyklus wird nicht verwendet"
         assert not {"NaN", "null", "undefined", "Infinity"} & set(browser.text.split())
         assert judge(browser, "unknown", tmp_path / "unknown.png", PHONE[0]) == []

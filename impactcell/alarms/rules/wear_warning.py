@@ -21,6 +21,7 @@ from impactcell.alarms.rule import (
 )
 from impactcell.alarms.rules import wear_limit
 from impactcell.records import Evidence, WearState
+from impactcell.records.uncertainty import told_cycles
 
 NAME = "WearWarning"
 """Published name."""
@@ -59,8 +60,8 @@ def _message(wear: WearState, probability: float, horizon: float) -> Message:
 def _cycles(wear: WearState, words: tuple[str, str]) -> str:
     """Write cycles left and their 95 % interval with words for "to" and "or more"."""
     left, low, high = wear.cycles_to_limit, wear.cycles_to_limit_low, wear.cycles_to_limit_high
-    end = f"{words[0]} {high:.0f}" if math.isfinite(high) else words[1]
-    return f"{left:.0f} ({low:.0f} {end}; 95 %)"
+    end = f"{words[0]} {told_cycles(high)}" if math.isfinite(high) else words[1]
+    return f"{told_cycles(left)} ({told_cycles(low)} {end}; 95 %)"
 
 
 RULE = AlarmRule(

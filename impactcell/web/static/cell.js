@@ -10,6 +10,7 @@ const tapSeries = [...edges, { colour: "curve", width: 1.5 }, { colour: "curve",
 const millimetres = (value) => (value === null ? "–" : value.toLocaleString(document.documentElement.lang, { minimumFractionDigits: 3, maximumFractionDigits: 3, useGrouping: false }));
 const place = (id) => document.getElementById(id);
 const SHOWN_SHIFTS = 5; // in words; more make a text that nobody reads
+const isEmpty = (series) => series.every((value) => value === null);
 const sign = (shift) => (shift.size > 0 ? "▲" : "▼");
 let limit = null, past = null, span = "hour", lastTrend = 0, charts = null, waiting = null;
 
@@ -99,24 +100,27 @@ function clearTrend(text) {
 }
 
 /** A mark is seen by some only, and has no room for more than a sign: what was found stands below in words. */
-function tellShifts(shifts) {
+function tellShifts(shifts, before = "") {
   const told = shifts.slice(-SHOWN_SHIFTS).reverse().map((shift) => {
     const size = Math.abs(shift.size), by = shift.size_std ? `${beside(shift.size_std, size)} ${toldStd(shift.size_std)}` : number(size, 2);
     return `${sign(shift)} ${texts.since_cycle} ${number(shift.cycle, 10)} (${moment(shift.time_ms)}) ${texts.friction} ${by} ${texts[shift.size > 0 ? "higher" : "lower"]}`;
   });
   if (shifts.length > told.length) told.push(`${texts.earlier_shifts} ${shifts.length - told.length}`);
-  const note = place("trend-note"), text = told.length ? `${texts.shifts}: ${told.join("; ")}.` : "";
+  const note = place("trend-note"), found = told.length ? `${texts.shifts}: ${told.join("; ")}` : "";
+  const text = [before, found].filter(Boolean).map((said) => `${said}.`).join(" ");
   if (note.textContent !== text) note.textContent = text;
 }
 
 function drawTrend() {
   if (!past) return;
   if (!past.time_ms.length) return clearTrend(texts.no_trend);
+  const isBlind = isEmpty(past.mu_s_low);
+  if (isBlind && isEmpty(past.level)) return clearTrend(texts.no_friction);
   const marks = past.batches.map(([ms, id]) => ({ x: ms / 1e3, text: id, colour: "soft" }));
   if (limit !== null) marks.push({ y: limit, text: texts.limit, colour: "bad", dashed: true });
   marks.push(...past.shifts.map((shift) => ({ x: shift.time_ms / 1e3, text: sign(shift), colour: "warn", dashed: true })));
   marks.sort((a, b) => (a.x ?? Infinity) - (b.x ?? Infinity)); // a word that would stand on one before is left out
-  tellShifts(past.shifts);
+  tellShifts(past.shifts, isBlind ? texts.no_friction : "");
   charts.trend.show([past.time_ms.map((ms) => ms / 1e3), past.mu_s_low, past.mu_s_high, past.level], marks);
 }
 

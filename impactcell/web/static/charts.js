@@ -49,6 +49,8 @@ function drawMarks(plot, marks) {
 // Steps of a time axis, s; also those between uPlot's own, which leave a narrow chart without a label.
 const TIME_STEPS = [1, 2, 5, 10, 15, 20, 30, ...[1, 2, 3, 5, 10, 15, 20, 30].map((m) => 60 * m), ...[1, 2, 3, 4, 6, 12].map((h) => 3600 * h), ...[1, 2, 3, 5, 7, 10, 14].map((d) => 86400 * d)];
 
+const LEAST_SPAN = 0.05; // of an axis, as a share of its value
+
 /** A chart in an element. `show` takes columns [x, band low, band high, line, ...]; series are described once. */
 export class Chart {
   constructor(element, { unit, xUnit, time = false, band = [1, 2], series, include = [] }) {
@@ -103,7 +105,9 @@ export class Chart {
     const range = (plot, low, high) => {
       const values = [low, high, ...this.marks.map((mark) => mark.y)].filter((value) => Number.isFinite(value));
       if (!values.length) return [0, 1];
-      const least = Math.min(...values), most = Math.max(...values), room = Math.max(most - least, 1e-9) * 0.08;
+      const least = Math.min(...values), most = Math.max(...values);
+      // One value alone gets a span that its labels can tell.
+      const room = 0.08 * (Math.max(most - least, LEAST_SPAN * Math.abs(most)) || 1);
       const above = this.marks.some((mark) => mark.y === most) ? 2.5 * room : room; // for its word
       return [least - room, most + above];
     };

@@ -24,8 +24,12 @@ export function beside(std, value) {
   const decimals = Math.min(Math.max(1 - Number((TOLD_STDS * std).toExponential(1).split("e")[1]), 0), 15);
   return new Intl.NumberFormat(language, { minimumFractionDigits: decimals, maximumFractionDigits: decimals, useGrouping: false }).format(value);
 }
-/** Cycles still to come: whole ones, and none that is not sure. */
-export const wholeCycles = (value) => (value === Infinity ? texts.never : Number.isFinite(value) ? number(Math.floor(value), 10) : "–");
+/** Cycles still to come: whole ones, none that is not sure, and three digits of them. */
+export function wholeCycles(value) {
+  if (!Number.isFinite(value)) return value === Infinity ? texts.never : "–";
+  const whole = Math.floor(value), unit = 10 ** Math.max(String(whole).length - 3, 0);
+  return number(Math.floor(whole / unit) * unit, 3);
+}
 /** One standard deviation of a value; null where it is not known. */
 export const stdOf = (values, path) => (Number.isFinite(values[`${path}StdDev`]) ? values[`${path}StdDev`] : null);
 export const withUnit = (value, unit, digits) => (value === null || value === undefined ? "–" : `${number(value, digits)} ${unit}`);
@@ -77,6 +81,7 @@ export function cyclesLeft(values) {
   if (level === null) return "–"; // not known, which is not the same as a limit that is out of sight
   if (limit !== null && level > limit) return high === 0 ? texts.passed : texts.perhaps_passed;
   if (cycles === Infinity) return texts.not_reached;
+  if (high === Infinity && low >= 1) return `${texts.more_than} ${wholeCycles(low)}`;
   const range = low === null ? "" : ` (${texts.from} ${wholeCycles(low)} ${texts.to} ${wholeCycles(high)})`;
   return `${wholeCycles(cycles)}${range}`;
 }

@@ -201,6 +201,8 @@ def test_a_limit_that_was_passed_is_said_to_be() -> None:
     assert "0.240, passed" in drawn([replace(snapshot, wear=there)])
     soon = replace(there, cycles_to_limit=12.0, cycles_to_limit_low=8.0, cycles_to_limit_high=19.0)
     assert "0.240 in 12 (8 to 19) cycles" in drawn([replace(snapshot, wear=soon)])
+    open_end = replace(soon, cycles_to_limit_low=8765.4, cycles_to_limit_high=math.inf)
+    assert "0.240 in more than 8760 cycles" in drawn([replace(snapshot, wear=open_end)])
 
 
 def test_before_the_first_cycle_it_says_how_long_and_what_is_waited_for() -> None:
