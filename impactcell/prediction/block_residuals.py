@@ -72,6 +72,35 @@ def linearise_blocks(
 
 
 @compiled
+def add_bends(curves: Samples, times: Samples, spread: Samples) -> None:
+    """Make means over blocks of curves at the blocks' mean times, in place.
+
+    The mean of a curve f is f + f'' s / 2 where the samples of a block scatter by a variance s about their
+    mean time. f'' is that of the parabola through the value and its neighbours, limited to twice those next
+    to it; 0 where these differ in sign, as beside a jump, and at the ends.
+
+    Parameters
+    ----------
+    curves : ndarray, shape (c n,)
+        One after the other, so near to each other that all bend as the first does.
+    times, spread : ndarray, shape (n,)
+        Mean time of each block [s], and s [s²].
+    """
+    size, before, bend, rate = len(times), 0.0, 0.0, 0.0
+    bends = np.zeros(size)
+    for i in range(1, size):
+        next_rate = (curves[i] - curves[i - 1]) / (times[i] - times[i - 1])
+        after = (next_rate - rate) / (times[i] - times[max(i - 2, 0)])
+        if i > 3 and before * bend > 0.0 and bend * after > 0.0:
+            largest = 2.0 * min(abs(before), abs(after))
+            bends[i - 2] = spread[i - 2] * min(max(bend, -largest), largest)
+        before, bend, rate = bend, after, next_rate
+    for first in range(0, len(curves), size):
+        for i in range(size):
+            curves[first + i] += bends[i]
+
+
+@compiled
 def rates_of_change(times: Samples, values: Samples) -> Samples:
     """Give the derivative, shape (n,), of the parabola through each value and its two neighbours.
 

@@ -116,8 +116,8 @@ def _std_factors_of_runs(channel: CheckedChannel, times: Samples) -> Samples:
 
     A run of n equal samples tells no more than one of them, with the rounding error of one.
     """
-    is_new = np.diff(channel.values) != 0.0
-    if float(np.mean(is_new)) > MAX_CHANGING:
+    is_new = channel.values[1:] != channel.values[:-1]
+    if np.count_nonzero(is_new) > MAX_CHANGING * len(is_new):
         return np.ones_like(times)
     run = np.append(0, np.cumsum(is_new))
     length = np.bincount(run)[run[np.searchsorted(channel.time_s, times).clip(max=len(run) - 1)]]

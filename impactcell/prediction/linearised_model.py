@@ -16,7 +16,7 @@ import numpy as np
 from impactcell.errors import PhysicsError
 from impactcell.physics import Ensemble, Plant, TapInput
 from impactcell.prediction.block_averaging import BlockMeans
-from impactcell.prediction.block_residuals import linearise_blocks, sample_squares
+from impactcell.prediction.block_residuals import add_bends, linearise_blocks, sample_squares
 from impactcell.records import Samples
 
 MU_K, RATIO, STIFFNESS, DAMPING, ONSET, MASS, VELOCITY, FORCE_SCALE, POSITION_SCALE = range(9)
@@ -140,6 +140,7 @@ class LinearisedModel:
             gravity_m_s2=plant.gravity_m_s2,
         )
         self._scatters = force.scatter, position.scatter
+        self._spreads = force.scatter.spread, position.scatter.spread
         is_force = np.arange(self.size) < len(force.values)
         zeros = np.array([is_force * zero_std[0], ~is_force * zero_std[1]])
         self._disturbances = zeros[np.array(zero_std) > 0.0]
@@ -277,6 +278,8 @@ class LinearisedModel:
         table = self._table.copy()
         table[:, 0], table[:, 1], table[:, 2], table[:, 3] = rows[:, STIFFNESS], damping, mu_s, mu_k
         traces = self._ensemble.traces(table, mass_kg=mass_kg, velocity_m_s=velocity_m_s, onset_s=onset_s)
+        add_bends(traces.force_n, self.force_time_s, self._spreads[0])
+        add_bends(traces.position_m, self.position_time_s, self._spreads[1])
         if count == PARAMETERS:
             return traces.force_n, traces.position_m
         return self._with_scales(traces.force_n, traces.position_m, theta[FORCE_SCALE:])
