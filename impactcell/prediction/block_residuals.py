@@ -1,11 +1,36 @@
 """Residuals of blocks and their normal equations, and residuals of the samples within: compiled."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linearisation:
+    """Normalised residuals, data minus model, and what their derivative by theta makes of them.
+
+    Attributes
+    ----------
+    residual : ndarray, shape (n,)
+    normal : ndarray, shape (p, p)
+        Product of the derivative with itself.
+    slope : ndarray, shape (p,)
+        Product of the derivative with the residuals.
+    chi2 : float
+        Sum of squares of the residuals.
+    traces : (ndarray, ndarray), shapes ((p + 1) force blocks,), ((p + 1) position blocks,)
+        Force [N] and position [m] of the model at theta and, one after the other, beside it.
+    """
+
+    residual: Samples
+    normal: Samples
+    slope: Samples
+    chi2: float
+    traces: tuple[Samples, Samples]
 
 
 @compiled
@@ -86,6 +111,8 @@ def add_bends(curves: Samples, times: Samples, spread: Samples) -> None:
     times, spread : ndarray, shape (n,)
         Mean time of each block [s], and s [s²].
     """
+    if not spread.any():
+        return
     size, before, bend, rate = len(times), 0.0, 0.0, 0.0
     bends = np.zeros(size)
     for i in range(1, size):

@@ -10,6 +10,7 @@ import numpy as np
 
 from impactcell.errors import NotConvergedError, PhysicsError
 from impactcell.prediction import gauss_newton
+from impactcell.prediction.block_residuals import Linearisation
 from impactcell.prediction.gauss_newton import Step, StopRule, step_within
 from impactcell.prediction.linearised_model import (
     DAMPING,
@@ -19,7 +20,6 @@ from impactcell.prediction.linearised_model import (
     RATIO,
     STIFFNESS,
     WITH_RECORDER,
-    Linearisation,
     LinearisedModel,
 )
 from impactcell.records import Samples

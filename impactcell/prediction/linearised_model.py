@@ -9,14 +9,14 @@ the scales of force and position. z (`kink_coordinate`) says whether the part st
 
 import math
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from impactcell.errors import PhysicsError
 from impactcell.physics import Ensemble, Plant, TapInput
 from impactcell.prediction.block_averaging import BlockMeans
-from impactcell.prediction.block_residuals import add_bends, linearise_blocks, sample_squares
+from impactcell.prediction.block_residuals import Linearisation, add_bends, linearise_blocks, sample_squares
 from impactcell.records import Samples
 
 MU_K, RATIO, STIFFNESS, DAMPING, ONSET, MASS, VELOCITY, FORCE_SCALE, POSITION_SCALE = range(9)
@@ -65,30 +65,6 @@ def parameters_of(plant: Plant) -> Samples:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Linearisation:
-    """Normalised residuals, data minus model, and what their derivative by theta makes of them.
-
-    Attributes
-    ----------
-    residual : ndarray, shape (n,)
-    normal : ndarray, shape (p, p)
-        Product of the derivative with itself.
-    slope : ndarray, shape (p,)
-        Product of the derivative with the residuals.
-    chi2 : float
-        Sum of squares of the residuals.
-    traces : (ndarray, ndarray), shapes ((p + 1) force blocks,), ((p + 1) position blocks,)
-        Force [N] and position [m] of the model at theta and, one after the other, beside it.
-    """
-
-    residual: Samples
-    normal: Samples
-    slope: Samples
-    chi2: float
-    traces: tuple[Samples, Samples]
-
-
 class LinearisedModel:
     """A capture in blocks, and the model that should reproduce them.
 
@@ -105,6 +81,7 @@ class LinearisedModel:
 
     Attributes
     ----------
+    plant : Plant
     parameters : int
         Length p of theta.
     kink_form : ndarray, shape (p,)
@@ -120,7 +97,7 @@ class LinearisedModel:
         recorder_std: RecorderStd = EXACT,
         zero_std: tuple[float, float] = (0.0, 0.0),
     ) -> None:
-        self.tap = tap
+        self.plant, self.tap = plant, tap
         self.recorder_std = np.array(recorder_std)
         self.parameters = parameter_count(recorder_std)
         _, mass_std, velocity_std, *_ = recorder_std
@@ -169,6 +146,13 @@ class LinearisedModel:
         """
         return float((shape * self._weights) @ residual)
 
+    def with_effects_of(self, plant: Plant) -> "LinearisedModel":
+        """Give the same blocks and what a plant with other effects makes of them."""
+        other = copy(self)
+        other.plant, other._ensemble = plant, self._ensemble.with_effects(tuple(plant.effects))  # noqa: SLF001
+        other._table = np.tile(other._ensemble.parameters(plant), (len(self._table), 1))  # noqa: SLF001
+        return other
+
     def products_with(self, shapes: Samples, fitted: Linearisation) -> tuple[Samples, Samples, Samples]:
         """Products of disturbances that are not in a fit: with its residuals, its derivative, each other.
 
@@ -198,6 +182,11 @@ class LinearisedModel:
         """Give the blocks of force [N] and position [m] that leave a residual."""
         model = self._values - residual / self._weights
         return model[: len(self.force_time_s)], model[len(self.force_time_s) :]
+
+    def curves(self, fitted: Linearisation) -> tuple[Samples, Samples]:
+        """Give the blocks of force [N] and position [m] of the model where it was linearised."""
+        force, position = fitted.traces
+        return force[: len(self.force_time_s)], position[: len(self.position_time_s)]
 
     def gap(self, residual: Samples) -> float:
         """RMS of the residuals of single samples over the noise of their sensor, from those of the blocks.

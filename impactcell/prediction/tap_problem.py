@@ -7,6 +7,7 @@ import numpy as np
 
 from impactcell.numerics.jit import compiled
 from impactcell.prediction import gauss_newton
+from impactcell.prediction.block_residuals import Linearisation
 from impactcell.prediction.gauss_newton import Step, StopRule, step_within
 from impactcell.prediction.linearised_model import (
     FARTHEST,
@@ -14,7 +15,6 @@ from impactcell.prediction.linearised_model import (
     PARAMETERS,
     POSITION_SCALE,
     RATIO,
-    Linearisation,
     LinearisedModel,
 )
 from impactcell.prediction.posterior import TruncatedGaussian

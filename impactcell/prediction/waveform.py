@@ -81,7 +81,7 @@ class WaveformFit:
         where it is above 1; where it is well above, the phases that the model misses count for less
         (`impactcell.prediction.phase_reweighting`).
     record_fault : str
-        What is wrong with the record, by what it explains.
+        What is wrong with the record, or with friction in slow slip, by what it explains.
     """
 
     mu_s: float

@@ -58,6 +58,13 @@ TAP_REASONS: Final[Mapping[str, str]] = {
         r"als stünde die Kraft \1 N neben ihrer Null: den Sensor nullen",
     r"as if position stood (\S+) µm off its zero: check where it is counted from":
         r"als stünde der Weg \1 µm neben seiner Null: prüfen, von wo er gezählt wird",
+    r"as if friction were (\S+) larger in slow slip, its first and last mm/s: run `impactcell discrepancy`":
+        r"als wäre die Reibung in langsamem Gleiten, den ersten und letzten mm/s, um \1 größer: "
+        r"`impactcell discrepancy` ausführen",
+    r"as if friction were (\S+) smaller in slow slip, its first and last mm/s: run `impactcell discrepancy`":
+        r"als wäre die Reibung in langsamem Gleiten, den ersten und letzten mm/s, um \1 kleiner: "
+        r"`impactcell discrepancy` ausführen",
+    r"or (as if .+)": r"oder \1",
     r"as if first contact lay (\S+) µs after t = 0: check the trigger":
         r"als läge der erste Kontakt \1 µs nach t = 0: den Trigger prüfen",
     r"as if first contact lay (\S+) µs before t = 0: check the trigger":
