@@ -176,7 +176,9 @@ def _of_one_tap(fault: PredictionError | PhysicsError) -> PredictionError:
             "and t = 0, first contact, are right, or give the cell's model",
             fault.gap,
         )
-    reason = re.sub(r"^no tap of the campaign can be (?:used|modelled); |shot 1: ", "", str(fault))
+    reason = re.sub(
+        r"^no tap of the campaign can be (?:used|modelled); |shot 1: |\. Command a stroke$", "", str(fault)
+    )
     hint = "; check velocity, mass, stroke and the units of the traces" if "modelled" in str(fault) else ""
     return PredictionError(f"the tap cannot be used: {reason}{'' if 'check' in reason else hint}")
 

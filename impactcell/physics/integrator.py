@@ -16,6 +16,7 @@ from impactcell.physics.boundary_samples import (
     last_sample_time,
 )
 from impactcell.physics.events import event_margin, first_event, margin_within, next_kink
+from impactcell.physics.forces import actuator_speed
 from impactcell.physics.memory_layout import DrivingForce, SmoothPhase, StepBuffers, TapRecord
 from impactcell.physics.mode_transitions import (
     apply_event,
@@ -50,6 +51,7 @@ MIN_FACTOR, MAX_FACTOR = 0.2, 6.0  # of the length of a step, from one to the ne
 SAFETY, EXPONENT = 0.9, 0.125  # of that factor, SAFETY error**-EXPONENT: 1/8 for a method of order 8
 LOCATING_STEPS = 4  # of Newton's method for an event; it converges in two
 NEGLIGIBLE_ERROR = 1e-6  # of a step, below which it may be lengthened by the largest factor
+STALLED = 1e-6  # of its commanded velocity, below which an actuator that was not halted stands
 SAMPLE_MARGIN_S = 1e-9  # beyond the last sample, so that it lies inside a step
 
 STEP_ROOM: Final = (3 + EXTENDED + INTERPOLANT) * at.STATE_WIDTH  # numbers of `StepBuffers`
@@ -186,15 +188,17 @@ def gives_up(steps: int, error: float, h: float, drive: DrivingForce, outputs: F
 @compiled
 def end_tap(t: float, horizon: float, phase: SmoothPhase, step: StepBuffers, record: TapRecord) -> None:
     """Fill what lies after the last step, and the outputs."""
-    outputs = record.outputs
+    outputs, state = record.outputs, step.state
     if t >= horizon and phase.contact_mode[at.SLIP] == 0:
-        # Held for good: the actuator has stalled against it, or nothing drives it any more.
-        outputs[at.STATUS] = at.AT_REST
+        # Between two slips of a part that is pushed on it is held, too, but not for good.
+        stalled = abs(actuator_speed(t, state, phase)) <= STALLED * phase.parameters[at.VELOCITY]
+        if phase.contact_mode[at.RUNNING] == 0 or stalled:
+            outputs[at.STATUS] = at.AT_REST
     if outputs[at.STATUS] in (at.TOO_MANY_EVENTS, at.TOO_MANY_STEPS):
         fill_unknown(record)
     else:
-        fill_after_end(t, step.state, phase, record)
-    finish_outputs(t, step.state, phase, outputs)
+        fill_after_end(t, state, phase, record)
+    finish_outputs(t, state, phase, outputs)
 
 
 @compiled

@@ -131,7 +131,7 @@ def _simulate(plant: Plant, tap: TapInput, initial_speed_m_s: float) -> Motion:
                 "the actuator pushed it without end. Command a stroke"
                 if endless
                 else f"it was still moving after {MAX_DURATION_S:g} s, or ran away. "
-                "Less tilt, or more friction"
+                f"{'Less tilt' if 'surface_tilt' in plant.effects else 'A lower velocity'}, or more friction"
             )
         )
     count = min(int(of_tap[at.EVENT_COUNT]), MAX_EVENTS)

@@ -182,6 +182,10 @@ def test_signs_and_a_start_that_are_not_those_of_a_tap_are_refused(
 def test_a_mass_that_no_plant_explains_is_told_without_the_words_of_a_campaign() -> None:
     tap = impactcell.simulate_tap(0.04, 18.9, plant=PLANT)
     with pytest.raises(NotConvergedError, match=r"^no k, b and mu_k/mu_s explain the tap; .* mass"):
+        impactcell.estimate(tap.time_s, tap.force_n, tap.position_m, 0.04, 189.0)
+    with pytest.raises(
+        PredictionError, match=r"cannot be used: .* pushed it without end; check velocity, mass, stroke and"
+    ):
         impactcell.estimate(tap.time_s, tap.force_n, tap.position_m, 0.04, 18900.0)
 
 

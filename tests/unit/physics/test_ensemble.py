@@ -1,6 +1,7 @@
 """Many taps at once give what each gives alone, and derivatives that are the closed form's."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -54,6 +55,19 @@ def test_an_ensemble_is_its_taps() -> None:
     )
     np.testing.assert_array_equal(figures.stop_s, [motion.stop_s for motion in motions])
     assert figures.at_rest.all()
+
+
+def test_a_part_that_is_held_between_two_slips_is_not_at_rest() -> None:
+    """The first is pushed on, the second stalls its actuator, the third is as yet below its breakaway."""
+    plant = Plant(6.5e5, 465.0, 0.2, 0.152)
+    pushed = Ensemble([TapInput(0.01, 100.0, halts_at_separation=True)])
+    held_on = pushed.outputs(pushed.parameters(plant), horizon_s=10.0)
+    assert not held_on.at_rest.any()
+    droop = {"actuator_droop": {"speed_loss_m_per_s_n": 8e-5, "time_constant_s": 2e-3}}
+    stalling = Ensemble([TapInput(0.0025, 28.5, 1e-3)], tuple(droop))
+    values = stalling.parameters(replace(plant, effects=droop))
+    assert stalling.outputs(values, horizon_s=10.0).at_rest.all()
+    assert not stalling.outputs(values, horizon_s=0.01).at_rest.any()
 
 
 def test_contact_of_each_tap_may_be_at_another_time() -> None:

@@ -174,10 +174,23 @@ def test_a_push_without_end_is_refused() -> None:
         simulate_tap(NOMINAL, TapInput(0.05, 18.9))
 
 
+@pytest.mark.parametrize(("velocity_m_s", "mass_kg"), [(0.01, 100.0), (0.0005, 18.9), (0.04, 18900.0)])
+def test_stick_and_slip_without_end_is_no_rest(velocity_m_s: float, mass_kg: float) -> None:
+    """After ten minutes the part is held for a moment, 6 m from where it lay, under an actuator that runs."""
+    with pytest.raises(NoStopError, match="pushed it without end"):
+        simulate_tap(NOMINAL, TapInput(velocity_m_s, mass_kg, halts_at_separation=True))
+
+
 def test_a_part_on_a_slope_too_steep_never_stops() -> None:
     steep = Plant(K, B, 0.05, 0.04, effects={"surface_tilt": {"tilt_rad": -0.06}})
-    with pytest.raises(NoStopError, match="still moving"):
+    with pytest.raises(NoStopError, match=r"still moving .* Less tilt, or more friction"):
         simulate_tap(steep, TapInput(0.05, 18.9, 1e-3))
+
+
+def test_a_part_with_hardly_any_friction_is_not_blamed_on_a_tilt() -> None:
+    slippery = Plant(K, B, 1e-6, 1e-6)
+    with pytest.raises(NoStopError, match=r"still moving .* A lower velocity, or more friction"):
+        simulate_tap(slippery, TapInput(0.05, 18.9, 1e-3))
 
 
 @pytest.mark.slow
