@@ -15,7 +15,11 @@ def library() -> str:
 def _section(identifier: str, effect: Effect) -> str:
     parameters = [
         f"- {code(parameter.name)} [{parameter.unit}], {parameter.lower:g} to {parameter.upper:g}"
-        + ("" if math.isnan(parameter.null) else f", vanishes at {parameter.null:g}")
+        + (
+            f", {parameter.typical:g} where it is left out"
+            if math.isnan(parameter.null)
+            else f", vanishes at {parameter.null:g}"
+        )
         for parameter in effect.parameters
     ]
     law = f"Acts on: {effect.kind.value}. Law: {code(effect.equation)}"

@@ -13,10 +13,11 @@ from threadpoolctl import threadpool_limits
 from impactcell.api.extended_model import write_extended_model
 from impactcell.api.finding_files import write_files
 from impactcell.api.machine_findings import investigate_with_base, write_machine_findings
+from impactcell.api.stated_tap import a_path
 from impactcell.campaign import Campaign, naming, read
 from impactcell.discrepancy.report import json_text, machine_document, result_document, write_reports
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
-from impactcell.errors import CampaignError
+from impactcell.errors import CampaignError, SettingsError
 from impactcell.prediction import Model
 from impactcell.settings.model_file import read_model
 
@@ -113,16 +114,16 @@ def discrepancy(
     """
     if seed < 0:
         raise CampaignError(f"seed is {seed}: a seed is a whole number of at least 0")
-    source = None if isinstance(campaign, Campaign) else Path(campaign)
+    source = None if isinstance(campaign, Campaign) else a_path("campaign", campaign, CampaignError)
     data = campaign if isinstance(campaign, Campaign) else read(Path(campaign))
     if base is not None:
         if model is not None:
             raise CampaignError("base is a whole model of a machine: leave model out, or base")
         with naming(source):
-            return _of_machine(data, Path(base), (train, test), seed)
+            return _of_machine(data, a_path("base", base, SettingsError), (train, test), seed)
     if train is not None or test is not None:
         raise CampaignError("train and test go with base; without it the seed divides the shots")
-    nominal = None if model is None else read_model(Path(model))
+    nominal = None if model is None else read_model(a_path("model", model, SettingsError))
     with naming(source), _blas_as_in_the_service(), ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         result = investigate(
             data,

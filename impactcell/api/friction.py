@@ -5,21 +5,21 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from impactcell.api.stated_tap import a_path, check_ascending, check_fastest
 from impactcell.campaign.pretrigger import is_late, late_onset
-from impactcell.errors import CaptureError, NotConvergedError, PhysicsError, PredictionError
+from impactcell.errors import CaptureError, NotConvergedError, PhysicsError, PredictionError, SettingsError
 from impactcell.features import Features, extract, impulse_balance, noise_std
+from impactcell.numerics.stated_numbers import numbers, one_number
 from impactcell.physics import TapInput
 from impactcell.prediction import Model, calibrate, estimate_from_features
 from impactcell.prediction.joint_plant_fit import estimate_mass, fit_plant
 from impactcell.process.console import print_note
 from impactcell.process.progress import progress
 from impactcell.records import (
-    MM_PER_MIN,
     Capture,
     Channel,
     FrictionEstimate,
@@ -41,10 +41,6 @@ LEAST_NOISE = 1e-4
 a sixth. Without it a simulated trace without noise would be held to the last bit of a float."""
 GRAVITY_M_S2 = 9.81
 """Of a tap given as arrays; m/s²."""
-FASTEST_M_S = 10.0
-"""Beyond it nothing is an actuator's velocity: ten times that of the fastest drives. Our choice."""
-USUAL_M_S = (1e-3, 1.0)
-"""Where velocities of taps lie: 60 to 60 000 mm/min."""
 
 
 def estimate(
@@ -66,8 +62,8 @@ def estimate(
     ----------
     time_s, force_n, position_m : array_like, shape (n,)
         Strictly ascending times, 0 at first contact; contact force, positive in compression; position along
-        the tap. Record until the part is at rest. The sensors' noise is taken from the traces, and is at
-        least 1e-4 of their largest values.
+        the tap. Samples that are masked, nan or inf count as lost. Record until the part is at rest. The
+        sensors' noise is taken from the traces, and is at least 1e-4 of their largest values.
     velocity_m_s, mass_kg : float
         Constant velocity of the actuator, and mass of the part.
     stroke_m : float
@@ -84,8 +80,9 @@ def estimate(
     Raises
     ------
     CaptureError
-        Arrays of different lengths, or of more than one dimension; a velocity or mass that cannot be; a force
-        that pulls, a position that falls, a contact that does not begin at t = 0.
+        Arrays of different lengths, or of more than one dimension; times that fall; a velocity, mass or
+        stroke that cannot be, or what is no number; a force that pulls, a position that falls, a contact that
+        does not begin at t = 0.
     SettingsError
         The model file cannot be read.
     PredictionError
@@ -99,28 +96,39 @@ def estimate(
     >>> f"{friction.mu_k.value:.4f}"
     '0.1600'
     """
-    time, force, position = (np.asarray(values, dtype=np.float64) for values in (time_s, force_n, position_m))
+    time = numbers("time_s", time_s, CaptureError)
+    force, position = _samples("force_n", force_n), _samples("position_m", position_m)
     if time.ndim != 1 or force.shape != time.shape or position.shape != time.shape:
         raise CaptureError(
             f"time_s, force_n and position_m must be of one length and one dimension, "
             f"not of shapes {time.shape}, {force.shape} and {position.shape}"
         )
-    _check_velocity(velocity_m_s, is_needed=model is None)
-    _check_mass(mass_kg, is_needed=model is None)
+    check_ascending(time)
+    velocity = one_number("velocity_m_s", velocity_m_s, CaptureError)
+    mass = one_number("mass_kg", mass_kg, CaptureError)
+    stroke = one_number("stroke_m", stroke_m, CaptureError)
+    _check_velocity(velocity, is_needed=model is None)
+    _check_mass(mass, is_needed=model is None)
+    if not stroke > 0.0:
+        raise CaptureError(
+            f"stroke_m = {stroke:g}: give the actuator's travel from first contact in m, above 0, or "
+            "leave it out where it halts as it loses contact"
+        )
+    model_file = None if model is None else a_path("model", model, SettingsError)
     capture = Capture(
         cycle=1,
-        velocity_m_s=velocity_m_s,
-        mass_kg=mass_kg,
+        velocity_m_s=velocity,
+        mass_kg=mass,
         force=_channel(time, force),
         position=_channel(time, position),
-        stroke_m=stroke_m,
+        stroke_m=stroke,
     )
     features = extract(as_recorded(capture))
     _check_signs_and_start(features)
-    if model is not None:
+    if model_file is not None:
         from impactcell.settings.model_file import read_model
 
-        return estimate_from_features(features, read_model(Path(model)))
+        return estimate_from_features(features, read_model(model_file))
     try:
         fit = fit_plant([features], GRAVITY_M_S2)
     except (PredictionError, PhysicsError) as fault:
@@ -129,13 +137,7 @@ def estimate(
 
 
 def _check_velocity(velocity_m_s: float, *, is_needed: bool) -> None:
-    if velocity_m_s > FASTEST_M_S:
-        units = {"mm/min": velocity_m_s * MM_PER_MIN, "mm/s": velocity_m_s * 1e-3}
-        meant = next((unit for unit, speed in units.items() if USUAL_M_S[0] <= speed <= USUAL_M_S[1]), None)
-        way_out = f"if that was meant in {meant}, give {units[meant]:.6g}" if meant else "check its unit"
-        raise CaptureError(
-            f"velocity_m_s = {velocity_m_s:g}: no actuator taps faster than {FASTEST_M_S:g} m/s; {way_out}"
-        )
+    check_fastest(velocity_m_s, CaptureError)
     if velocity_m_s < 0.0 or (is_needed and not velocity_m_s > 0.0):
         raise CaptureError(
             f"velocity_m_s = {velocity_m_s:g}: give the actuator's speed in m/s, above 0; position_m is "
@@ -183,10 +185,16 @@ def _of_one_tap(fault: PredictionError | PhysicsError) -> PredictionError:
     return PredictionError(f"the tap cannot be used: {reason}{'' if 'check' in reason else hint}")
 
 
+def _samples(name: str, given: ArrayLike) -> Samples:
+    """Give the samples of a channel; nan those that were lost: masked, or infinite."""
+    values = numbers(name, given, CaptureError)
+    return np.where(np.isfinite(values), values, math.nan)
+
+
 def _channel(time_s: Samples, values: Samples) -> Channel:
     """Give the channel its own noise, or the least that a sensor has."""
     channel = Channel(time_s, values)
-    least = LEAST_NOISE * float(np.abs(values).max(initial=0.0))
+    least = LEAST_NOISE * float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
     return replace(channel, noise_std=max(noise_std(channel), least))
 
 

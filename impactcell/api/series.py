@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from impactcell.cell.series_replay import TrackedSeries, replay, whole_number_fault
 from impactcell.errors import SeriesError
+from impactcell.numerics.stated_numbers import numbers
 from impactcell.records import Samples
 from impactcell.tracking.wear_batch import BatchKnowledge, FrictionObservation, TrackerSettings
 from impactcell.tracking.wear_batch.input_validation import LARGEST_FRICTION
@@ -86,10 +87,7 @@ def track(
 
 def _numbers(name: str, given: ArrayLike) -> Samples:
     """Give an array of numbers; what a masked one hides is nan."""
-    try:
-        return np.atleast_1d(np.ma.filled(np.ma.asarray(given, np.float64), math.nan))
-    except (TypeError, ValueError) as error:
-        raise SeriesError(f"{name} is to hold numbers: {error}") from error
+    return np.atleast_1d(numbers(name, given, SeriesError))
 
 
 def _one_number(name: str, given: ArrayLike) -> float:

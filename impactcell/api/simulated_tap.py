@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from impactcell.api.stated_tap import check_fastest, check_sample_times
 from impactcell.errors import PhysicsError
+from impactcell.numerics.stated_numbers import numbers, one_number
 from impactcell.physics import Plant, TapInput
 from impactcell.physics import simulate_tap as integrate_tap
 from impactcell.records import Samples
@@ -91,7 +93,8 @@ def simulate_tap(
     Raises
     ------
     PhysicsError
-        A mass, velocity, field or effect that cannot be, or a part that never comes to rest.
+        A mass, velocity, time, field or effect that cannot be, what is no number, or a part that never comes
+        to rest.
 
     Examples
     --------
@@ -99,14 +102,18 @@ def simulate_tap(
     >>> f"{tap.peak_force_n:.0f} N, {1e6 * tap.sliding_distance_m:.0f} um"
     '266 N, 6744 um'
     """
+    velocity = one_number("velocity_m_s", velocity_m_s, PhysicsError)
+    mass = one_number("mass_kg", mass_kg, PhysicsError)
+    stroke = one_number("stroke_m", stroke_m, PhysicsError)
+    check_fastest(velocity, PhysicsError)
+    stated = None if time_s is None else np.atleast_1d(numbers("time_s", time_s, PhysicsError))
+    if stated is not None:
+        check_sample_times(stated)
     motion = integrate_tap(
-        _plant(plant), TapInput(velocity_m_s, mass_kg, stroke_m, halts_at_separation=math.isinf(stroke_m))
+        _plant(plant), TapInput(velocity, mass, stroke, halts_at_separation=math.isinf(stroke))
     )
-    times = (
-        np.arange(math.ceil((motion.stop_s + REST_S) * RATE_HZ) + 1) / RATE_HZ
-        if time_s is None
-        else np.atleast_1d(np.asarray(time_s, dtype=np.float64))
-    )
+    until_s = motion.stop_s + REST_S
+    times = np.arange(math.ceil(until_s * RATE_HZ) + 1) / RATE_HZ if stated is None else stated
     traces = motion.sample(times)
     left = motion.first_breakaway_s <= motion.last_separation_s
     return SimulatedTap(
@@ -127,11 +134,14 @@ def simulate_tap(
 def _plant(given: Plant | Mapping[str, Any] | None) -> Plant:
     if isinstance(given, Plant):
         return given
+    if given is not None and not isinstance(given, Mapping):
+        raise PhysicsError(f"plant is a Plant, or some of its fields by name, not {given!r}")
     fields: dict[str, Any] = {**REFERENCE_PLANT, **(given or {})}
-    unknown = sorted(set(fields) - set(Plant.__dataclass_fields__))
+    unknown = [name for name in fields if name not in Plant.__dataclass_fields__]
     if unknown:
         raise PhysicsError(
             f"plant: no field {unknown[0]!r}; there are {', '.join(Plant.__dataclass_fields__)}"
         )
-    fields.setdefault("mu_k", RATIO * fields["mu_s"])
+    if "mu_k" not in fields:
+        fields["mu_k"] = RATIO * one_number("plant: mu_s", fields["mu_s"], PhysicsError)
     return Plant(**fields)

@@ -10,6 +10,7 @@ import numpy as np
 
 from impactcell.errors import PhysicsError
 from impactcell.numerics.jit import IntArray, address
+from impactcell.numerics.stated_numbers import one_number
 from impactcell.physics import memory_layout as at
 from impactcell.physics.effect import Covariates, Effect, LawKind
 from impactcell.physics.effects import find_effect
@@ -188,7 +189,8 @@ def parameter_vector(plant: Plant, program: LawTable, batches: int = 1) -> Sampl
     Raises
     ------
     PhysicsError
-        For a parameter that its effect does not have, one out of its range, or a wrong number of batches.
+        For a parameter that its effect does not have, one that is no number or out of its range, or a wrong
+        number of batches.
     """
     values = [plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k]
     for effect in program.effects:
@@ -201,15 +203,16 @@ def parameter_vector(plant: Plant, program: LawTable, batches: int = 1) -> Sampl
             )
         for parameter in effect.parameters:
             neutral = parameter.typical if math.isnan(parameter.null) else parameter.null
-            value = given.get(parameter.name, neutral)
-            several = list(value) if isinstance(value, Sequence) else [value]
+            value, name = given.get(parameter.name, neutral), f"{effect.identifier}: {parameter.name}"
+            row = value if isinstance(value, Sequence | np.ndarray) and parameter.per_batch else (value,)
+            several = [one_number(name, each, PhysicsError) for each in row]
             if parameter.per_batch:
                 several += [neutral] * (batches - 1 - len(several))
                 several = several[: batches - 1]
             for number in several:
                 if not parameter.lower <= number <= parameter.upper:
                     raise PhysicsError(
-                        f"{effect.identifier}: {parameter.name} is {number}, outside "
+                        f"{name} is {number}, outside "
                         f"{parameter.lower:g} to {parameter.upper:g} {parameter.unit}"
                     )
             values += several

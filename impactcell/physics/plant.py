@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from impactcell.errors import PhysicsError
+from impactcell.numerics.stated_numbers import one_number
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +25,8 @@ class Plant:
     gravity_m_s2 : float
     effects : mapping
         Identifier of each effect present, and its parameters by name (`impactcell.physics.effects`).
-        A parameter that is left out has the value at which its effect vanishes.
+        A strength that is left out has the value at which its effect vanishes; what has none, as a period,
+        a reach or a Stribeck velocity, its typical one.
     """
 
     stiffness_n_per_m: float
@@ -36,12 +38,25 @@ class Plant:
 
     def __post_init__(self) -> None:
         """Refuse a plant that no part can have."""
+        for name in ("stiffness_n_per_m", "damping_n_s_per_m", "mu_s", "mu_k", "gravity_m_s2"):
+            one_number(f"plant: {name}", getattr(self, name), PhysicsError)
         for name in ("stiffness_n_per_m", "gravity_m_s2"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) > 0.0):
                 raise PhysicsError(f"plant: {name} must be positive, not {getattr(self, name)}")
         for name in ("damping_n_s_per_m", "mu_s", "mu_k"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise PhysicsError(f"plant: {name} must be 0 or more, not {getattr(self, name)}")
+        if not isinstance(self.effects, Mapping):
+            raise PhysicsError(
+                "plant: effects is to be a mapping from each effect to its parameters by name, "
+                f"{{'viscous_friction': {{}}}} say, not {self.effects!r}"
+            )
+        for identifier, parameters in self.effects.items():
+            if not isinstance(parameters, Mapping):
+                raise PhysicsError(
+                    f"plant: {identifier} is to have its parameters by name, {{}} where none is given, "
+                    f"not {parameters!r}"
+                )
 
 
 @dataclass(frozen=True, slots=True)

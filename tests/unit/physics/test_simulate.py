@@ -193,6 +193,36 @@ def test_a_part_with_hardly_any_friction_is_not_blamed_on_a_tilt() -> None:
         simulate_tap(slippery, TapInput(0.05, 18.9, 1e-3))
 
 
+@pytest.mark.parametrize(
+    ("effects", "message"),
+    [
+        (["viscous_friction"], "plant: effects is to be a mapping"),
+        (None, "plant: effects is to be a mapping .* not None"),
+        ({"viscous_friction": None}, "plant: viscous_friction is to have its parameters by name"),
+        ({"viscous_friction": 85.0}, "plant: viscous_friction is to have its parameters by name"),
+    ],
+)
+def test_effects_that_are_none_are_refused_by_name(effects: object, message: str) -> None:
+    with pytest.raises(PhysicsError, match=message):
+        Plant(K, B, MU_S, MU_K, effects=effects)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("value", ["85", None, [85.0, 90.0], np.array([85.0])])
+def test_a_parameter_of_an_effect_is_one_number(value: object) -> None:
+    plant = Plant(K, B, MU_S, MU_K, effects={"viscous_friction": {"viscous_coefficient_n_s_per_m": value}})  # type: ignore[dict-item]
+    with pytest.raises(PhysicsError, match=r"^viscous_friction: viscous_coefficient_n_s_per_m is to be one"):
+        simulate_tap(plant, TapInput(0.05, 18.9, 1e-3))
+
+
+def test_a_value_a_batch_may_be_an_array() -> None:
+    tap = TapInput(0.05, 18.9, 1e-3, batch=2)
+    of_row, of_array = (
+        simulate_tap(Plant(K, B, MU_S, MU_K, effects={"batch_shift": {"relative_change": values}}), tap)
+        for values in ((0.05, -0.1), np.array([0.05, -0.1]))
+    )
+    assert of_row.displacement_m == of_array.displacement_m
+
+
 @pytest.mark.slow
 def test_a_part_that_runs_away_over_waves_is_given_up_and_no_sample_is_taken_for_a_rest() -> None:
     # In the time allowed it would cross some 1e8 waves.
