@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from impactcell.errors import PositioningError
 from impactcell.numerics.raster import ANY_VALUE, Raster
 from impactcell.positioning.action_selection import ActionSpace
 from impactcell.positioning.displacement_discrepancy import FEATURES, MASS_KG, POSITION_M
@@ -17,10 +16,15 @@ from impactcell.positioning.displacement_quantiles import (
 )
 from impactcell.positioning.dynamic_programming import Goal, ValueFunction, solve_value_function
 from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior, anticipate_learning
-from impactcell.positioning.planner_questions import FURTHEST_M, is_number, is_positive
 from impactcell.positioning.quadrature import COARSE_Z, coarse_nodes
 from impactcell.positioning.safety_limits import allowed_strokes
 from impactcell.positioning.scatter_hypotheses import quantile_scales
+from impactcell.positioning.stated_limits import (
+    LIMITS,
+    check_limit,
+    check_overshoot_probability,
+    check_raster,
+)
 from impactcell.records import Samples
 
 SLOWEST_M_S = 0.005  # velocity of the table that hardly moves a part
@@ -52,10 +56,6 @@ SCATTER_Z = np.array([1.0, 3.0])
 """Nodes at which scatter is compared."""
 STALE_SCATTER = np.array([[4e-3, 4e-3, 0.02], [6e-3, 6e-3, 0.04]])
 """Change of the scatter at these nodes after which a table is made anew."""
-LIMITS = (
-    ("tolerance_m", False), ("max_velocity_m_s", False), ("max_stroke_m", True), ("max_force_n", True),
-)  # fmt: skip
-"""Names of the limits that must be positive, and whether a cell may do without: inf."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,18 +72,11 @@ class PlannerLimits:
 
     def __post_init__(self) -> None:
         """Refuse what no cell can have."""
-        for name, may_lack in LIMITS:
-            value = getattr(self, name)
-            if not (is_positive(value) or (may_lack and value == math.inf)):
-                raise PositioningError(f"tap planner: {name} must be positive, not {value}")
-        if FURTHEST_M < self.max_stroke_m < math.inf:
-            raise PositioningError(
-                f"tap planner: no stroke is {self.max_stroke_m:g} m long; max_stroke_m is in metres"
-            )
-        if not (is_number(self.overshoot_probability) and 0.0 < self.overshoot_probability < 1.0):
-            raise PositioningError(
-                f"tap planner: overshoot_probability lies between 0 and 1, not {self.overshoot_probability}"
-            )
+        for name in LIMITS:
+            check_limit(name, getattr(self, name))
+        check_overshoot_probability(self.overshoot_probability)
+        for name in ("velocity_raster", "stroke_raster"):
+            check_raster(name, getattr(self, name))
 
     @property
     def commandable(self) -> tuple[float, float, float, Raster, Raster]:

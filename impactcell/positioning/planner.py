@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from impactcell.errors import PositioningError
 from impactcell.numerics.raster import ANY_VALUE, Raster
 from impactcell.physics import Plant, free_motion
 from impactcell.positioning import model_hypotheses
+from impactcell.positioning import planner_questions as questions
 from impactcell.positioning.cautious_selection import LEAST_STEP_M, choose_action
 from impactcell.positioning.compiling import compile_planning
 from impactcell.positioning.displacement_band import BAND_Z, displacement_band, tap_of
@@ -26,11 +26,11 @@ from impactcell.positioning.lookahead_table import (
 from impactcell.positioning.model_hypotheses import tap_predictions, with_model_accepted, with_score
 from impactcell.positioning.nominal_plant import nominal_plant
 from impactcell.positioning.planner_posterior import PlannerPosterior
-from impactcell.positioning.planner_questions import check_observation, check_question, lightest_kg
 from impactcell.positioning.posterior_update import update_posterior
 from impactcell.positioning.prediction_watch import score_of
 from impactcell.positioning.quadrature import Z
 from impactcell.positioning.safety_limits import PLANNED_SHARE, largest_force, room_m
+from impactcell.positioning.stated_limits import check_sides
 from impactcell.positioning.tap import Tap, Unreachable
 from impactcell.positioning.tap_model import model_of_tap
 from impactcell.positioning.without_tap import overshooting, too_light, unmoved
@@ -101,9 +101,7 @@ class TapPlanner:
         plant = nominal_plant(self.plant)
         viscous = max(free_motion.linear_resistance(plant), 0.0)
         self._gravity = plant.gravity_m_s2
-        self._lightest_kg = lightest_kg(plant.stiffness_n_per_m, plant.damping_n_s_per_m + viscous)
-        if not self.travel_m[0] < self.travel_m[1]:
-            raise PositioningError(f"tap planner: travel_m must be in order, not {self.travel_m}")
+        self._lightest_kg = questions.lightest_kg(plant.stiffness_n_per_m, plant.damping_n_s_per_m + viscous)
         compile_planning()
         self._posterior = model_hypotheses.prior(
             plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k, viscous
@@ -122,8 +120,7 @@ class TapPlanner:
         PositioningError
             For anything but a posterior.
         """
-        if not isinstance(posterior, PlannerPosterior):
-            raise PositioningError(f"tap planner: resume takes what `posterior` gave, not {posterior!r}")
+        questions.check_posterior(posterior)
         self._posterior = posterior
 
     def accept_model(self) -> None:
@@ -158,8 +155,8 @@ class TapPlanner:
             For a distance, mass or position that no part has, one in mm for instance, and for limits that
             were changed to what no cell can have.
         """
-        check_question(remaining_m, mass_kg, position_m, self.travel_m)
         self._take_limits()
+        questions.check_question(remaining_m, mass_kg, position_m, self.travel_m)
         if abs(remaining_m) <= self.tolerance_m:
             return None
         if remaining_m < 0.0 and not self.two_sided:
@@ -192,9 +189,9 @@ class TapPlanner:
         ------
         PositioningError
             For what is no tap, as `Unreachable`, or one that no cell makes; for a displacement or a mass that
-            is not a number.
+            is not a number; for a displacement against the tap, or far beyond what taps make, as one in mm.
         """
-        check_observation(tap, moved_m, mass_kg)
+        questions.check_observation(tap, moved_m, mass_kg, self._posterior.mu_k * self._gravity)
         self._still = self._still + 1 if abs(moved_m) < LEAST_STEP_M else 0
         part = self._part(mass_kg)
         place = np.array([tap.position_m, float(tap.direction)])
@@ -210,10 +207,9 @@ class TapPlanner:
         Raises
         ------
         PositioningError
-            For a coefficient that is not positive or a deviation that is negative.
+            For a coefficient that is not positive or that no surface has, or a deviation that is negative.
         """
-        if not (math.isfinite(mu_k) and mu_k > 0.0 and math.isfinite(std) and std >= 0.0):
-            raise PositioningError(f"cannot use a friction of {mu_k} with a standard deviation of {std}")
+        questions.check_friction(mu_k, std)
         self._posterior = model_hypotheses.condition_on_friction(
             self._posterior, mu_k, std, batch_changed=batch_changed
         )
@@ -224,15 +220,21 @@ class TapPlanner:
         Raises
         ------
         PositioningError
-            For a signature whose arrays do not belong together.
+            For what is no signature, or one whose arrays do not belong together.
         """
+        questions.check_signature(signature)
         if signature.quality is not Quality.BAD:
             self._profile = update_stroke_friction(
                 self._profile, signature.position_m, signature.friction, signature.friction_std
             )
 
     def force(self, tap: Tap, mass_kg: float) -> float:
-        """Bound on the contact force of a tap (N), for `impactcell.positioning.safety_limits.check_tap`."""
+        """Bound on the contact force of a tap (N), for `impactcell.positioning.safety_limits.check_tap`.
+
+        Raises `PositioningError` for what is no tap, or no mass.
+        """
+        questions.check_is_tap(tap)
+        questions.check_mass(mass_kg)
         return largest_force(
             tap.velocity_m_s, tap.stroke_m, stiffest(self._posterior), mass_kg, self._gravity
         )
@@ -263,6 +265,7 @@ class TapPlanner:
         return tap_of(action, self._posterior, part, place)
 
     def _stated_limits(self) -> PlannerLimits:
+        check_sides(self.two_sided, self.travel_m)
         return PlannerLimits(
             self.tolerance_m, self.max_velocity_m_s, self.max_stroke_m, self.max_force_n,
             self.overshoot_probability, self.velocity_raster, self.stroke_raster,

@@ -3,10 +3,21 @@
 import math
 
 from impactcell.errors import PositioningError
+from impactcell.positioning.planner_posterior import PlannerPosterior
 from impactcell.positioning.tap import Tap
+from impactcell.records import Signature
 
 FURTHEST_M = 10.0
 """Further from the origin of its axis, or from its target, no part of a cell lies: mm have been given."""
+FURTHER = 20.0
+"""Times what a part slides at the speed of its actuator, v²/(2 mu_k g), and the stroke: beyond it no tap
+moves one. The springiest contact gives it four times as much."""
+LONGEST_M = 0.1
+"""In place of the stroke where the actuator halts at loss of contact: how far a part may be pushed before."""
+BACK_M = 1e-4
+"""By more than that no reading of a part that moved nothing lies behind where it was."""
+LARGEST_FRICTION = 10.0
+"""No dry pair of materials comes near."""
 MOST_DAMPED = 4.0
 """Damping over critical damping of a contact up to which taps are foretold: beyond it a part hardly springs
 back, and the closed form is off by more than a tenth."""
@@ -29,6 +40,11 @@ def is_positive(value: object) -> bool:
     return is_number(value) and value > 0.0  # type: ignore[operator]
 
 
+def shown(value: object) -> str:
+    """Show what was given: a text with its quotes."""
+    return repr(value) if isinstance(value, str) else str(value)
+
+
 def check_question(
     remaining_m: float, mass_kg: float, position_m: float, travel_m: tuple[float, float]
 ) -> None:
@@ -39,11 +55,10 @@ def check_question(
     PositioningError
     """
     if not is_number(remaining_m):
-        raise PositioningError(f"remaining distance must be a number of metres, not {remaining_m}")
-    if not is_positive(mass_kg):
-        raise PositioningError(f"mass of the part must be a positive number of kg, not {mass_kg}")
+        raise PositioningError(f"remaining distance must be a number of metres, not {shown(remaining_m)}")
+    check_mass(mass_kg)
     if not is_number(position_m):
-        raise PositioningError(f"position of the part must be a number of metres, not {position_m}")
+        raise PositioningError(f"position of the part must be a number of metres, not {shown(position_m)}")
     low, high = travel_m
     if max(low - position_m, position_m - high) > high - low:
         raise PositioningError(
@@ -58,30 +73,111 @@ def check_question(
         )
 
 
-def check_observation(tap: Tap, moved_m: float, mass_kg: float) -> None:
+def check_observation(tap: Tap, moved_m: float, mass_kg: float, slowing_m_s2: float) -> None:
     """Refuse to learn from what is no tap, or from what no part does; see `TapPlanner.observe`.
+
+    `slowing_m_s2` is about what friction slows the part by.
+
+    Raises
+    ------
+    PositioningError
+    """
+    check_is_tap(tap)
+    if not (is_number(moved_m) and is_positive(mass_kg)):
+        raise PositioningError(
+            f"cannot learn from a displacement of {shown(moved_m)} m of {shown(mass_kg)} kg"
+        )
+    if moved_m < -BACK_M:
+        raise PositioningError(
+            f"cannot learn from a displacement of {moved_m:g} m: it is positive along the tap; give what the "
+            "position has changed by, times the tap's direction"
+        )
+    stroke_m = tap.stroke_m if tap.stroke_m < math.inf else LONGEST_M
+    furthest_m = FURTHER * tap.velocity_m_s**2 / (2.0 * slowing_m_s2) + stroke_m
+    if moved_m > furthest_m:
+        units = {"mm": 1e-3 * moved_m, "µm": 1e-6 * moved_m}
+        meant = next((unit for unit, moved in units.items() if moved <= furthest_m), None)
+        raise PositioningError(
+            f"cannot learn from a displacement of {moved_m:g} m, where no tap at {tap.velocity_m_s:.3g} m/s "
+            f"moves a part by more than {furthest_m:.2g} m"
+            + (f"; if that was meant in {meant}, give {units[meant]:.6g}" if meant else "")
+        )
+
+
+def check_friction(mu_k: float, std: float) -> None:
+    """Refuse what is no kinetic coefficient with its deviation; see `TapPlanner.observe_friction`.
+
+    Raises
+    ------
+    PositioningError
+    """
+    if not (is_positive(mu_k) and is_number(std) and std >= 0.0):
+        raise PositioningError(
+            f"cannot use a friction of {shown(mu_k)} with a standard deviation of {shown(std)}: the one is a "
+            "number above 0, the other one of 0 or more"
+        )
+    if mu_k > LARGEST_FRICTION:
+        raise PositioningError(
+            f"cannot use a friction of {mu_k:g}: no surface has it; if that was meant in %, "
+            f"give {0.01 * mu_k:g}"
+        )
+
+
+def check_posterior(posterior: PlannerPosterior) -> None:
+    """Refuse what is no posterior; see `TapPlanner.resume`.
+
+    Raises
+    ------
+    PositioningError
+    """
+    if not isinstance(posterior, PlannerPosterior):
+        raise PositioningError(f"tap planner: resume takes what `posterior` gave, not {posterior!r}")
+
+
+def check_signature(signature: Signature) -> None:
+    """Refuse what is no signature; see `TapPlanner.observe_signature`.
+
+    Raises
+    ------
+    PositioningError
+    """
+    if not isinstance(signature, Signature):
+        raise PositioningError(f"cannot learn from {signature!r}: that is no signature")
+
+
+def check_mass(mass_kg: float) -> None:
+    """Refuse what is no mass.
+
+    Raises
+    ------
+    PositioningError
+    """
+    if not is_positive(mass_kg):
+        raise PositioningError(f"mass of the part must be a positive number of kg, not {shown(mass_kg)}")
+
+
+def check_is_tap(tap: Tap) -> None:
+    """Refuse what is no tap, or one that no cell makes.
 
     Raises
     ------
     PositioningError
     """
     if not isinstance(tap, Tap):
-        raise PositioningError(f"cannot learn from {tap!r}: that is no tap")
-    if not (is_number(moved_m) and is_positive(mass_kg)):
-        raise PositioningError(f"cannot learn from a displacement of {moved_m} m of {mass_kg} kg")
+        raise PositioningError(f"cannot use {tap!r}: that is no tap")
     if not is_positive(tap.velocity_m_s):
         raise PositioningError(
-            f"cannot learn from a tap at {tap.velocity_m_s} m/s: its velocity must be positive"
+            f"cannot use a tap at {shown(tap.velocity_m_s)} m/s: its velocity must be positive"
         )
     if not (is_positive(tap.stroke_m) or tap.stroke_m == math.inf):
         raise PositioningError(
-            f"cannot learn from a tap with a stroke of {tap.stroke_m} m: its stroke must be positive"
+            f"cannot use a tap with a stroke of {shown(tap.stroke_m)} m: its stroke must be positive"
         )
     if tap.direction not in {1, -1}:
-        raise PositioningError(f"cannot learn from a tap in direction {tap.direction}: it must be 1 or -1")
+        raise PositioningError(f"cannot use a tap in direction {shown(tap.direction)}: it must be 1 or -1")
     if not (is_number(tap.position_m) and abs(tap.position_m) <= FURTHEST_M):
         raise PositioningError(
-            f"cannot learn from a tap at the position {tap.position_m} m: positions are in metres"
+            f"cannot use a tap at the position {shown(tap.position_m)} m: positions are in metres"
         )
 
 

@@ -12,6 +12,7 @@ A part that lies within the tolerance is in place however it got there; how it d
 but for the planner, which learns from each observation.
 """
 
+import contextlib
 import enum
 import math
 from dataclasses import dataclass, replace
@@ -227,16 +228,12 @@ def observed(sequence: TaskState, cell: PositioningCell, planner: TapPlanner, po
     if not math.isfinite(position_m):
         return failed(sequence, f"{cell.name}: the module reported no position after tap {sequence.taps}")
     moved = (position_m - sequence.position_m) * tap.direction
-    planner.observe(tap, moved, sequence.mass_kg)
+    with contextlib.suppress(PositioningError):  # no tap moves a part so: `_miss` tells it
+        planner.observe(tap, moved, sequence.mass_kg)
     lies = replace(sequence, position_m=position_m, tap=None, replans=0)
-    half = 0.5 * (tap.highest_m - tap.lowest_m)
-    missed = abs(moved - tap.expected_m) / half * BAND_SIGMAS if half > 0.0 else math.inf
-    evidence = Evidence(
-        statistic=min(missed, LARGEST_STATISTIC),
-        threshold=BAND_SIGMAS,
-        size=moved - tap.expected_m,
-        size_std=half / BAND_SIGMAS,
-    )
+    half, off = 0.5 * (tap.highest_m - tap.lowest_m), moved - tap.expected_m
+    missed = abs(off) / half * BAND_SIGMAS if half > 0.0 else math.inf
+    evidence = Evidence(min(missed, LARGEST_STATISTIC), BAND_SIGMAS, size=off, size_std=half / BAND_SIGMAS)
     miss = _miss(sequence.taps, tap, moved, cell.resolution_m)
     if abs(lies.remaining_m) <= planner.tolerance_m:
         return replace(lies, phase=TaskPhase.SETTLED, reason=f"in place; {miss}" if miss else "in place")

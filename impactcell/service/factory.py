@@ -213,18 +213,27 @@ def tap_planner(
     design: CellDesign,
     registers: RegisterMap,
 ) -> TapPlanner:
-    """Make the planner of a cell, which has learned nothing yet: of taps that `registers` can express."""
+    """Make the planner of a cell, which has learned nothing yet: of taps that `registers` can express.
+
+    Raises
+    ------
+    PositioningError
+        A limit of the cell is one that no cell has.
+    """
     settings, limits = cell.settings.positioning, limited.limits
     assert settings is not None  # noqa: S101 - `positioning_cell` has looked
-    return TapPlanner(
-        tolerance_m=settings.tolerance_um * 1e-6,
-        max_velocity_m_s=limits.velocity_m_s,
-        max_stroke_m=limits.stroke_m,
-        overshoot_probability=settings.overshoot_probability,
-        plant=design.model.plant,
-        max_force_n=limits.force_n,
-        two_sided=limited.two_sided,
-        velocity_raster=commanded_values(registers, "command_velocity"),
-        stroke_raster=commanded_values(registers, "command_stroke"),
-        travel_m=limits.travel_m,
-    )
+    try:
+        return TapPlanner(
+            tolerance_m=settings.tolerance_um * 1e-6,
+            max_velocity_m_s=limits.velocity_m_s,
+            max_stroke_m=limits.stroke_m,
+            overshoot_probability=settings.overshoot_probability,
+            plant=design.model.plant,
+            max_force_n=limits.force_n,
+            two_sided=limited.two_sided,
+            velocity_raster=commanded_values(registers, "command_velocity"),
+            stroke_raster=commanded_values(registers, "command_stroke"),
+            travel_m=limits.travel_m,
+        )
+    except PositioningError as refused:
+        raise PositioningError(f"{cell.path}: {refused}") from refused

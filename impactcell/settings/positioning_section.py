@@ -1,8 +1,8 @@
 """Placing the part by taps, in a cell file."""
 
-from typing import Self
+from typing import Annotated, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from impactcell.settings.fields import Positive, Probability, Section
 
@@ -10,7 +10,7 @@ from impactcell.settings.fields import Positive, Probability, Section
 class PositioningSection(Section):
     """Placing the part by taps."""
 
-    tolerance_um: Positive = 50.0
+    tolerance_um: Annotated[Positive, Field(le=5000.0)] = 50.0
     """The part is in place when it is this near its target."""
     travel_mm: Positive = 40.0
     """Targets beyond this are refused."""

@@ -99,6 +99,107 @@ def test_a_limit_that_no_cell_has_is_named(options: dict[str, float]) -> None:
 
 
 @pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"tolerance_m": 20.0}, "tolerance_m is 20, .* meant in µm, give 2e-05"),
+        ({"tolerance_m": 0.02}, "tolerance_m is 0.02, .* meant in mm, give 2e-05"),
+        ({"tolerance_m": "20e-6"}, "tolerance_m must be positive, not '20e-6'"),
+        ({"max_velocity_m_s": 6000.0}, "max_velocity_m_s is 6000, .* meant in mm/min, give 0.1"),
+        ({"max_velocity_m_s": 100.0}, "max_velocity_m_s is 100, .* meant in mm/s, give 0.1"),
+        ({"max_velocity_m_s": "0.1"}, "max_velocity_m_s must be positive, not '0.1'"),
+        ({"max_stroke_m": 1.5}, "max_stroke_m is 1.5, .* meant in mm, give 0.0015"),
+        ({"max_stroke_m": 1500.0}, "max_stroke_m is 1500, .* meant in µm, give 0.0015"),
+        ({"max_force_n": "a"}, "max_force_n must be positive, not 'a'"),
+        ({"overshoot_probability": "x"}, "overshoot_probability lies between 0 and 1, not 'x'"),
+        ({"travel_m": 0.04}, r"travel_m is to be two positions in m, \(0.0, 0.04\) say, not 0.04"),
+        ({"travel_m": ("a", "b")}, r"travel_m is to be two positions in m, .* not \('a', 'b'\)"),
+        ({"travel_m": (0.0, 0.02, 0.04)}, "travel_m is to be two positions in m"),
+        ({"travel_m": (0.0, math.nan)}, "travel_m must be in order"),
+        ({"travel_m": (0.0, 40.0)}, r".*no travel ends at 40 m; if that was meant in mm, give \(0, 0.04\)"),
+        ({"velocity_raster": 0.001}, "velocity_raster is to be an .*Raster.* not 0.001"),
+        ({"stroke_raster": None}, "stroke_raster is to be an .*Raster.* not None"),
+        ({"two_sided": "no"}, "two_sided is to be True or False, not 'no'"),
+        ({"two_sided": None}, "two_sided is to be True or False, not None"),
+    ],
+)
+def test_a_limit_in_another_unit_or_that_is_none_is_told_when_it_is_made_and_when_it_is_set(
+    options: dict[str, object], told: str
+) -> None:
+    with pytest.raises(PositioningError, match=f"^tap planner: {told}"):
+        TapPlanner(**options)  # type: ignore[arg-type]
+    planner = TapPlanner()
+    for name, value in options.items():
+        setattr(planner, name, value)
+    with pytest.raises(PositioningError, match=f"^tap planner: {told}"):
+        planner.next_tap(0.01, 18.9)
+
+
+def test_a_travel_that_is_set_the_wrong_way_round_is_told_as_that() -> None:
+    planner = TapPlanner()
+    planner.travel_m = (1.0, 0.0)
+    with pytest.raises(PositioningError, match=r"travel_m must be in order, not \(1.0, 0.0\)"):
+        planner.next_tap(0.01, 18.9)
+
+
+@pytest.mark.parametrize(
+    ("friction", "told"),
+    [
+        (("x", 0.1), "friction of 'x' with a standard deviation of 0.1"),
+        ((None, 0.1), "friction of None"),
+        ((0.19, None), "standard deviation of None"),
+        ((19.0, 0.2), "friction of 19: no surface has it; if that was meant in %, give 0.19"),
+    ],
+)
+def test_a_friction_that_is_none_is_told(friction: tuple[float, float], told: str) -> None:
+    with pytest.raises(PositioningError, match=f"^cannot use a .*{told}"):
+        TapPlanner().observe_friction(*friction)
+
+
+def test_what_is_no_signature_no_tap_and_no_mass_is_told() -> None:
+    planner = TapPlanner()
+    with pytest.raises(PositioningError, match="cannot learn from 'x': that is no signature"):
+        planner.observe_signature("x")  # type: ignore[arg-type]
+    with pytest.raises(PositioningError, match="cannot use None: that is no tap"):
+        planner.force(None, 18.9)  # type: ignore[arg-type]
+    with pytest.raises(PositioningError, match="mass of the part must be a positive number of kg, not 'a'"):
+        planner.force(Tap(0.05, 1e-3), "a")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("tap", "moved_m", "told"),
+    [
+        (Tap(0.03, 0.5e-3), 4.0, "more than .* m; if that was meant in mm, give 0.004"),
+        (Tap(0.03, 0.5e-3), 400.0, "more than .* m; if that was meant in µm, give 0.0004"),
+        (Tap(0.1, 1.5e-3), 10.7, "if that was meant in mm, give 0.0107"),
+        (Tap(0.03, math.inf), 4.0, "if that was meant in mm, give 0.004"),
+        (Tap(0.03, 0.5e-3), -0.004, "displacement of -0.004 m: it is positive along the tap"),
+        (Tap(0.03, 0.5e-3, -1), -4.0, "displacement of -4 m: it is positive along the tap"),
+        (Tap(0.03, 0.5e-3), "0.004", "displacement of '0.004' m"),
+    ],
+)
+def test_nothing_is_learned_from_a_displacement_that_no_tap_makes(
+    tap: Tap, moved_m: float, told: str
+) -> None:
+    planner = TapPlanner()
+    before = planner.posterior
+    with pytest.raises(PositioningError, match=f"^cannot learn from a .*{told}"):
+        planner.observe(tap, moved_m, 18.9)
+    assert planner.posterior is before
+
+
+@pytest.mark.parametrize("mu_k", [0.02, 0.19])
+@pytest.mark.parametrize("velocity_m_s", [0.005, 0.1, 1.0])
+def test_what_the_springiest_contact_makes_of_a_tap_is_learned_from(mu_k: float, velocity_m_s: float) -> None:
+    """It leaves at twice the actuator's speed; an encoder that scatters may show a part a little behind."""
+    tap, furthest = Tap(velocity_m_s, 1.5e-3), 4.0 * velocity_m_s**2 / (2.0 * mu_k * 9.81) + 1.5e-3
+    for moved in (furthest, -2e-5):
+        planner = TapPlanner(plant={"mu_k": mu_k})
+        before = planner.posterior
+        planner.observe(tap, moved, 18.9)
+        assert planner.posterior is not before
+
+
+@pytest.mark.parametrize(
     ("plant", "told"),
     [
         ({"mu_s": 0}, "plant: mu_s must be positive, not 0"),
@@ -121,7 +222,7 @@ def test_a_plant_that_cannot_be_planned_with_is_told(plant: Plant | dict[str, fl
 @pytest.mark.parametrize(
     ("tap", "told"),
     [
-        (None, "cannot learn from None: that is no tap"),
+        (None, "cannot use None: that is no tap"),
         (Unreachable("too far"), "that is no tap"),
         (Tap(math.inf, 1e-3), "velocity must be positive"),
         (Tap(0.05, 0.0), "stroke must be positive"),

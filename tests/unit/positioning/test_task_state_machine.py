@@ -137,6 +137,16 @@ def test_a_displacement_outside_its_band_stops_with_evidence(side: float) -> Non
     assert inside.phase in {TaskPhase.COMMANDING, TaskPhase.SETTLED}
 
 
+@pytest.mark.parametrize(("position_m", "told"), [(5.0, "outside the 99.9 % band"), (-0.5, "moved nothing")])
+def test_a_part_that_was_carried_off_teaches_nothing_and_stops_the_task(position_m: float, told: str) -> None:
+    sequence, made = waiting()
+    before = made.posterior
+    stopped = observed(sequence, CELL, made, position_m)
+    assert stopped.phase is TaskPhase.FAULTED
+    assert told in stopped.reason
+    assert made.posterior is before
+
+
 def test_a_part_on_its_target_is_in_place_however_it_got_there_and_the_miss_is_told() -> None:
     """Before, "the part is not in place" was said of one that lay on its target."""
     sequence, made = waiting()

@@ -118,6 +118,7 @@ def test_a_name_or_an_address_is_a_host(config: Path, host: str) -> None:
             "format: 1\npositioning: {tolerance_um: 50, travel_mm: 0.04}",
             r"travel_mm 0.04 is 40 µm, no more than .* \(tolerance_um 50\): check the units of both",
         ),
+        ("format: 1", "format: 1\npositioning: {tolerance_um: 50000}", "tolerance_um.* 5000"),
         ("format: 1", "format: 2", "format"),
         ("cell: prototype", "cell: 7", "valid string"),
         ("../models/prototype.yaml", "none.yaml", "no file"),

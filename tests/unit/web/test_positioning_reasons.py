@@ -30,7 +30,7 @@ SAID_BY = (
 SAID_AS = ("PositioningError", "ObjectionError", "Unreachable")
 NO_TASK = re.compile(
     r"tap planner: .*|remaining distance must .*|(mass|position) of the part must .*|"
-    r"cannot (learn from|use a) .*"
+    r"cannot (learn from|use) .*"
 )
 """What the planner says to who calls it otherwise than a task does."""
 CELLS = {"cell", "name", "cell.name", "self._cell.name", "self._module.cell"}
