@@ -8,7 +8,6 @@ the module or the link does: that is said in its `status` and in the `faults` of
 import asyncio
 import contextlib
 import logging
-from collections import deque
 from collections.abc import AsyncGenerator, Callable
 from dataclasses import replace
 from typing import Self
@@ -24,6 +23,7 @@ from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.fetched_capture import NotFetched
 from impactcell.fieldbus.identity import IdentityCheck
 from impactcell.fieldbus.modbus_client import ModbusClient
+from impactcell.fieldbus.module_account import ModuleAccount
 from impactcell.fieldbus.poll_schedule import PollSchedule
 from impactcell.fieldbus.received_cycle import ReceivedCycle
 from impactcell.fieldbus.register_client import RegisterClient
@@ -32,13 +32,9 @@ from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.fieldbus.status_reader import StatusReader
 from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.process.cell_logger import CellLogger
-from impactcell.process.condition_log import kind_of
 from impactcell.records import CycleId, ModuleStatus
 
 __all__ = ["ModuleAcquisition", "ModuleStatus", "ReceivedCycle"]
-
-_NO_SESSION = "; or it was started anew, and how many are lost is not known: no register session tells"
-"""Said of a loss over an outage."""
 
 
 class ModuleAcquisition:
@@ -78,12 +74,9 @@ class ModuleAcquisition:
         self._numbers = CycleNumbers.of(registers["cycle_counter"].kind)
         self._taken = TakenCycles(None, 0, registers.slots, self._numbers)
         self._dates = CycleDates(registers, self._log)
-        self._status = ModuleStatus()
-        self._logged = deque[str](maxlen=16)  # kinds of reasons since there was a connection
-        self._on_change = on_change
+        self._account = ModuleAccount(cell, self._log, on_change and (lambda: on_change(self.status)))
         self._ready = asyncio.Event()
         self._acknowledgement = Acknowledgement(self._log, self.register_client, self._numbers)
-        self._connections = self._counted_on = 0  # the latter: those that there were at the last cycle
         self._said_given_up = False
         self._identity = IdentityCheck(cell, self.register_client, self._status_reader)
 
@@ -91,10 +84,10 @@ class ModuleAcquisition:
     def status(self) -> ModuleStatus:
         """State of the link and counts."""
         return replace(
-            self._status,
+            self._account.status,
             round_trip_s=self._client.round_trip_s,
             discarded=self._reader.discarded,
-            reconnects=max(0, self._connections - 1),
+            reconnects=max(0, self._account.connections - 1),
         )
 
     @property
@@ -114,8 +107,8 @@ class ModuleAcquisition:
         """Close the connection."""
         self._ready.clear()
         await self._client.close()
-        level = logging.INFO if self._status.connected else logging.DEBUG
-        self._report_link(connected=False, reason=f"{self.cell}: connection closed", level=level)
+        level = logging.INFO if self._account.status.connected else logging.DEBUG
+        self._account.disconnect(f"{self.cell}: connection closed", level)
 
     async def wait_connected(self) -> None:
         """Wait until the right module answers; `captures` must be running meanwhile."""
@@ -192,7 +185,13 @@ class ModuleAcquisition:
                 backoff.reset()
             capture = replace(fetched.capture, session=target.cycle_id.session)
             is_newest = target.cycle_id == newest
-            capture = self._dates.dated(capture, readable=fetched.readable, is_newest=is_newest)
+            capture = self._dates.dated(
+                capture,
+                readable=fetched.readable,
+                is_newest=is_newest,
+                restarted=target.restarted,
+                now_s=loop.time(),
+            )
             last = taken.last
             schedule.update(
                 1e-9 * fetched.capture.time_ns or loop.time(),
@@ -203,7 +202,7 @@ class ModuleAcquisition:
             received = ReceivedCycle(
                 capture, target.cycle_id, target.missed, target.restarted, fetched.faults
             )
-            self._count(received, readable=fetched.readable)
+            self._account.count(received, readable=fetched.readable)
             yield received
             if taken.last == newest:  # nothing waits behind it
                 await asyncio.sleep(schedule.delay_s(loop.time()))
@@ -249,8 +248,7 @@ class ModuleAcquisition:
         await self._identity.check_word_order(status)
         await self._acknowledgement.send(status)
         if not self._ready.is_set():
-            self._connections += 1
-            self._report_link(connected=True, reason="")
+            self._account.connect(self.link)
             self._ready.set()
         return status
 
@@ -259,42 +257,4 @@ class ModuleAcquisition:
         self._ready.clear()
         await self._client.close()
         reason = str(error) if str(error).startswith(self.cell) else f"{self.cell}: {error}"
-        self._report_link(connected=False, reason=reason)
-
-    def _report_link(self, *, connected: bool, reason: str, level: int = logging.WARNING) -> None:
-        before, kind = self._status, kind_of(reason)
-        if (before.connected, kind_of(before.reason)) == (connected, kind):
-            return
-        self._status = replace(before, connected=connected, reason=reason)
-        if connected:
-            self._logged.clear()
-            self._log.info("connected to %s", self.link)
-        elif kind not in self._logged:
-            self._logged.append(kind)
-            self._log.log(level, "%s", reason.removeprefix(f"{self.cell}: "))
-        if self._on_change is not None:
-            self._on_change(self.status)
-
-    def _count(self, received: ReceivedCycle, *, readable: bool) -> None:
-        status = self._status
-        self._status = replace(
-            status,
-            received=status.received + 1,
-            missed=status.missed + received.missed,
-            restarts=status.restarts + received.restarted,
-            unreadable=status.unreadable + (not readable),
-        )
-        cycle = received.cycle_id.cycle
-        if received.missed:
-            are, them = ("is", "it") if received.missed == 1 else ("are", "them")
-            why = "was started anew, or had overwritten" if received.restarted else "had overwritten"
-            tells = received.restarted or received.cycle_id.session or self._connections == self._counted_on
-            doubt = "" if tells else _NO_SESSION
-            self._log.warning(
-                "%d before it %s lost: the module %s %s%s",
-                received.missed, are, why, them, doubt, cycle=cycle,
-            )  # fmt: skip
-        self._counted_on = self._connections
-        for fault in received.faults:
-            said = fault.removeprefix(f"{self.cell}: cycle {cycle}").lstrip(": ")
-            self._log.warning("%s", said, cycle=cycle)
+        self._account.disconnect(reason)

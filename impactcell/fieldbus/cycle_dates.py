@@ -1,5 +1,6 @@
 """When a cycle was made: by the module's clock, or by the service's where the module has none that is set."""
 
+import math
 import time
 from dataclasses import replace
 from typing import Final
@@ -14,6 +15,10 @@ _TOLERANCE_S: Final = 60.0
 """Two clocks that are set may be so far apart, and no cycle is dated after it was read by more [s]."""
 _ZONE_S, _FARTHEST_ZONE_S = 900.0, 14 * 3600.0
 """Local times are ahead of UTC by a multiple of the one, at most by the other [s]."""
+_FAR_BEHIND_S: Final = 365.25 * 86_400.0
+"""A clock that is farther behind is told [s]: many begin with a year long gone after power-up."""
+_REST_S: Final = 3600.0
+"""Between two warnings of a clock that is ahead [s]."""
 
 
 def seconds_ahead(time_ns: int) -> float:
@@ -51,27 +56,39 @@ class CycleDates:
     registers : RegisterMap
         Its layout.
     log : CellLogger
-        Told that the clock which the map has is not set, or ahead of this machine's: once, and again if it
-        gets farther ahead.
+        Told that the clock which the map has is not set, or years behind this machine's: once. Or ahead of
+        it: once, and again, no more than once an hour, if it gets farther ahead or was right meanwhile.
     """
 
     def __init__(self, registers: RegisterMap, log: CellLogger) -> None:
         self._clock = registers.registers.get("cycle_time")
         self._log = log
         self._registers = registers
-        self._said_not_set = False
+        self._said_not_set = self._said_behind = False
         self._said_ahead_s = 0.0
+        self._may_say_ahead_s = -math.inf
+        self._watched = False
 
-    def dated(self, capture: Capture, *, readable: bool, is_newest: bool) -> Capture:
+    def dated(
+        self, capture: Capture, *, readable: bool, is_newest: bool, restarted: bool, now_s: float
+    ) -> Capture:
         """Return a capture that has just been asked for with a date: now, where it has none of its own.
 
         A clock before 2000 is none that was set: it counts from power-up. Of a capture that is not `readable`
-        the module's time is not known, which says nothing of its clock. How far that is ahead the newest
-        cycle tells best.
+        the module's time is not known, which says nothing of its clock. How far that is off the newest cycle
+        tells best: ahead any of them, behind one that was made since another was the newest one.
+
+        Parameters
+        ----------
+        restarted : bool
+            Whether this is the first cycle of another life of the module, or of another module.
+        now_s : float
+            By a clock that is never set.
         """
+        self._watched &= not restarted
         if capture.time_ns >= EARLIEST_NS:
             if is_newest:
-                self._tell_ahead(capture)
+                self._tell_off(capture, now_s)
             return capture
         if readable and self._clock is not None and not self._said_not_set:
             self._said_not_set = True
@@ -82,12 +99,20 @@ class CycleDates:
             )  # fmt: skip
         return replace(capture, time_ns=time.time_ns())
 
-    def _tell_ahead(self, capture: Capture) -> None:
-        """Warn of a clock that is ahead, or farther ahead than was said."""
+    def _tell_off(self, capture: Capture, now_s: float) -> None:
+        """Warn of a clock that is ahead, or farther ahead than was said, or years behind."""
         ahead_s = seconds_ahead(capture.time_ns)
-        told = clock_ahead(self._registers, ahead_s)
-        if not told:
+        if told := clock_ahead(self._registers, ahead_s):
+            if ahead_s > self._said_ahead_s + _TOLERANCE_S and now_s >= self._may_say_ahead_s:
+                self._said_ahead_s, self._may_say_ahead_s = ahead_s, now_s + _REST_S
+                self._log.warning("%s", told, cycle=capture.cycle)
+        else:
             self._said_ahead_s = 0.0
-        elif ahead_s > self._said_ahead_s + _TOLERANCE_S:
-            self._said_ahead_s = ahead_s
-            self._log.warning("%s", told, cycle=capture.cycle)
+        if self._clock is not None and self._watched and -ahead_s > _FAR_BEHIND_S and not self._said_behind:
+            self._said_behind = True
+            self._log.warning(
+                "register cycle_time (%d) shows a time %d days behind this machine's UTC: cycles and alarms "
+                "are dated in the past; set the module's clock to UTC",
+                self._clock.address, -ahead_s // 86_400.0, cycle=capture.cycle,
+            )  # fmt: skip
+        self._watched = True

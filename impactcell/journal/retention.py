@@ -38,7 +38,8 @@ class Retention:
     ----------
     days, captures_days : float
         Cycles, and captures, older than this are dropped. One without a time (0, from a module whose clock is
-        not set) is of unknown age, and goes only when its room is needed.
+        not set) is of unknown age, and goes only when its room is needed. What a clock that was behind has
+        dated goes after all that was stored before it.
     max_size_bytes : int
         When less than `FREE_SHARE` of it is left, room is made, oldest first: of alarms and actions beyond
         their `SHARE`, of captures, then of cycles with their alarms.
@@ -82,17 +83,22 @@ def prune(
     oldest_capture_ns = now_ns - int(min(keep.captures_days, keep.days) * NS_PER_DAY)
     captures = database.execute(
         "DELETE FROM captures WHERE seq IN (SELECT seq FROM cycles WHERE time_ns > 0 AND time_ns < ? "
-        "AND EXISTS (SELECT 1 FROM captures WHERE captures.seq = cycles.seq) ORDER BY time_ns LIMIT ?)",
-        (oldest_capture_ns, PRUNE_LIMIT),
+        "AND seq < ? AND EXISTS (SELECT 1 FROM captures WHERE captures.seq = cycles.seq) "
+        "ORDER BY time_ns LIMIT ?)",
+        (oldest_capture_ns, _first_young(database, "captures", oldest_capture_ns, now_ns), PRUNE_LIMIT),
     )
     cycles = database.execute(
         "DELETE FROM cycles WHERE seq IN (SELECT seq FROM cycles WHERE time_ns > 0 AND time_ns < ? "
-        "AND seq < (SELECT max(seq) FROM cycles) ORDER BY time_ns LIMIT ?)",
-        (oldest_ns, PRUNE_LIMIT),
+        "AND seq < ? AND seq < (SELECT max(seq) FROM cycles) ORDER BY time_ns LIMIT ?)",
+        (oldest_ns, _first_young(database, "cycles", oldest_ns, now_ns), PRUNE_LIMIT),
     )
     more = PRUNE_LIMIT in (captures.rowcount, cycles.rowcount)
     over = f"time_ns NOT IN ({', '.join(map(str, active_ns))})"
-    database.execute(f"DELETE FROM alarms WHERE time_ns > 0 AND time_ns < ? AND {over}", (oldest_ns,))  # noqa: S608
+    database.execute(
+        f"DELETE FROM alarms WHERE time_ns > 0 AND time_ns < ?1 AND {over} "  # noqa: S608 - from above
+        "AND time_ns NOT IN (SELECT time_ns FROM cycles WHERE time_ns < ?1)",
+        (oldest_ns,),
+    )
     database.execute("DELETE FROM audit WHERE time_ns < ?", (oldest_ns,))
     for _ in range(PRUNE_LIMIT // _CHUNK):
         if _size(database) <= (1.0 - FREE_SHARE) * keep.max_size_bytes:
@@ -105,6 +111,22 @@ def prune(
     database.executescript("PRAGMA incremental_vacuum")
     database.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchall()
     return more
+
+
+def _first_young(database: sqlite3.Connection, table: str, oldest_ns: int, now_ns: int) -> int:
+    """Give the number of the first cycle of `table` that is not old; without any, one after the last.
+
+    Nothing behind it is old, whatever its time says: it was stored later, by a clock that was behind. A time
+    after `now_ns` tells nothing of age.
+    """
+    query = (
+        f"SELECT seq FROM cycles NOT INDEXED WHERE seq >= (SELECT min(seq) FROM {table}) "  # noqa: S608 - ours
+        "AND time_ns BETWEEN ? AND ? ORDER BY seq LIMIT 1"
+    )  # from the oldest on: by time it would have to look at all that are young
+    row = database.execute(query, (oldest_ns, now_ns)).fetchone()
+    if row is None:
+        row = database.execute("SELECT coalesce(max(seq), 0) + 1 FROM cycles").fetchone()
+    return int(row[0])
 
 
 def _drop_oldest(database: sqlite3.Connection, most: int, over: str) -> bool:

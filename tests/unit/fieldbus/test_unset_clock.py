@@ -7,8 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from impactcell.fieldbus.cycle_dates import clock_ahead
+from impactcell.fieldbus.cycle_dates import CycleDates, clock_ahead
+from impactcell.fieldbus.decoding import empty_capture
 from impactcell.fieldbus.registers import RegisterMap
+from impactcell.process.cell_logger import CellLogger
 from simulator.scripted import ScriptedDevice
 from tests.unit.fieldbus.test_acquisition import HEADER, make, running
 
@@ -80,19 +82,52 @@ HOUR = 3600 * SECOND
 async def test_a_clock_that_is_ahead_is_told_once_with_the_way_out(
     fpga: RegisterMap, caplog: pytest.LogCaptureFixture, ahead_ns: int, said: str, way_out: str
 ) -> None:
-    """And once more when it is set back and ahead again; the time of a cycle stays the module's."""
+    """The time of a cycle stays the module's."""
     device = ScriptedDevice(fpga)
     async with running(fpga, device) as (_, _module, receptions):
         for ahead in (ahead_ns, ahead_ns, 0, ahead_ns):
             shown_ns = time.time_ns() + ahead
             make(device, cycle_time=shown_ns)
             assert (await anext(receptions)).capture.time_ns == shown_ns
-    told = [record.getMessage() for record in caplog.records if "ahead" in record.getMessage()]
-    assert len(told) == 2
-    for text in told:
-        assert f"register cycle_time (264) shows a time {said} ahead of this machine's UTC" in text
-        assert way_out in text
-        assert ("offset" in text) == ("offset" in way_out)
+    (text,) = [record.getMessage() for record in caplog.records if "ahead" in record.getMessage()]
+    assert f"register cycle_time (264) shows a time {said} ahead of this machine's UTC" in text
+    assert way_out in text
+    assert ("offset" in text) == ("offset" in way_out)
+
+
+def tell(dates: CycleDates, ahead_ns: int, now_s: float, *, restarted: bool = False) -> None:
+    """A newest cycle by a clock that is so far ahead."""
+    capture = replace(empty_capture(7), time_ns=time.time_ns() + ahead_ns)
+    dates.dated(capture, readable=True, is_newest=True, restarted=restarted, now_s=now_s)
+
+
+def test_a_clock_that_leaps_to_and_fro_is_told_once_an_hour(
+    fpga: RegisterMap, caplog: pytest.LogCaptureFixture
+) -> None:
+    dates = CycleDates(fpga, CellLogger(logging.getLogger(__name__), "cell-1"))
+    for cycle in range(100):
+        tell(dates, 2 * HOUR * (cycle % 2) * (1 + cycle), now_s=50.0 + 90.0 * cycle)
+    assert len(caplog.records) == 3
+
+
+def test_a_clock_that_is_years_behind_is_told_once_with_the_way_out(
+    fpga: RegisterMap, caplog: pytest.LogCaptureFixture
+) -> None:
+    """By no cycle that may be as old: the newest one at the start, and after a restart of the module."""
+    dates = CycleDates(fpga, CellLogger(logging.getLogger(__name__), "cell-1"))
+    years_ns = 400 * 24 * HOUR
+    tell(dates, -years_ns, 0.0)
+    tell(dates, -years_ns, 1.0, restarted=True)
+    tell(dates, 0, 2.0)
+    tell(dates, -300 * 24 * HOUR, 3.0)
+    assert not caplog.records
+    for second in range(5):
+        tell(dates, -years_ns, 10.0 + second)
+    (told,) = caplog.records
+    assert told.getMessage() == (
+        "cell=cell-1 cycle=7 register cycle_time (264) shows a time 400 days behind this machine's UTC: "
+        "cycles and alarms are dated in the past; set the module's clock to UTC"
+    )
 
 
 def test_the_offset_of_a_local_time_is_in_the_unit_of_its_register(fpga: RegisterMap) -> None:

@@ -116,6 +116,38 @@ def test_a_clock_that_is_ahead_makes_nothing_old_until_cycles_have_come_by_it_fo
         assert journal.borne_out_ns(hours_later_ns) == hours_later_ns
 
 
+def test_what_a_clock_that_is_behind_has_dated_is_no_older_than_what_was_stored_before_it(
+    tmp_path: Path,
+) -> None:
+    """A module whose clock begins years ago after power-up, until somebody sets it."""
+    long_ago_ns, today_ns = BEGIN - 4000 * DAY, BEGIN + DAY
+    with filled(tmp_path / "j", 5) as journal:
+        for cycle in range(100, 105):
+            capture = replace(make_capture(cycle, samples=10), time_ns=long_ago_ns + cycle * SECOND)
+            came = came_and_went(1, capture.time_ns)
+            journal.append(capture, make_snapshot(capture), b"", [came])
+        for cycle in range(105, 108):
+            capture = replace(make_capture(cycle, samples=10), time_ns=today_ns - SECOND)
+            journal.append(capture, make_snapshot(capture), b"")
+        journal.prune(Retention(), today_ns)
+        assert stored(tmp_path / "j", 13)[:3] == (13, 13, 5)
+        journal.prune(Retention(), today_ns + 30 * DAY - 1800 * SECOND)  # of yesterday no capture is kept
+        assert stored(tmp_path / "j", 13)[:3] == (13, 3, 5)
+        journal.prune(Retention(), today_ns + 366 * DAY)
+        assert stored(tmp_path / "j", 13)[:3] == (1, 0, 0)
+
+
+def test_a_time_to_come_makes_no_cycle_behind_it_young(tmp_path: Path) -> None:
+    capture = replace(make_capture(1, samples=10), time_ns=BEGIN + 10_000 * DAY)
+    with Journal(tmp_path / "j", "c") as journal:
+        journal.append(capture, make_snapshot(capture), b"")
+        for cycle in range(2, 6):
+            capture = replace(make_capture(cycle, samples=10), time_ns=BEGIN + cycle * SECOND)
+            journal.append(capture, make_snapshot(capture), b"")
+        journal.prune(Retention(), BEGIN + 400 * DAY)
+        assert stored(tmp_path / "j", 5)[:2] == (2, 1)
+
+
 def test_without_a_cycle_the_clock_is_all_there_is(tmp_path: Path) -> None:
     with Journal(tmp_path / "j", "c") as journal:
         assert journal.borne_out_ns(BEGIN) == BEGIN

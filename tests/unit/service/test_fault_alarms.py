@@ -129,18 +129,18 @@ async def test_a_lost_link_tells_why_it_is_lost_now(
     monkeypatch.setattr("impactcell.service.cell_task.TICK_S", 0.01)
     name = module_connection.NAME
     async with beside(task._tell_link()), beside(task._tick()):
-        task._module._report_link(connected=False, reason=SILENT)
+        task._module._account.disconnect(SILENT)
         await says(task, name, "no connection within 500 ms (timeout_ms)")
         await acknowledge(task, name)
-        task._module._report_link(connected=False, reason=STRANGER)
+        task._module._account.disconnect(STRANGER)
         now = await says(task, name, "map prototype expects 18753")
         assert (now.active, now.acknowledged) == (True, True)
         assert "die Karte prototype erwartet 18753" in now.message_de
         for attempt in range(100):  # which of them stands cannot be seen, and nothing is told of numbers
             reason = STRANGER.replace("shows 7", f"shows {attempt}")
-            task._module._report_link(connected=False, reason=reason)
+            task._module._account.disconnect(reason)
             await asyncio.sleep(0)
-        task._module._report_link(connected=True, reason="")
+        task._module._account.connect("the module")
         async with asyncio.timeout(PATIENCE_S):
             while alarm(task, name).active:
                 await asyncio.sleep(0.01)
@@ -166,7 +166,7 @@ async def test_a_start_of_the_service_is_no_fault_of_the_link(
             while ticks < 5:
                 await asyncio.sleep(0)
         assert not alarm(task, name).active
-        task._module._report_link(connected=False, reason=SILENT)
+        task._module._account.disconnect(SILENT)
         assert (await says(task, name, "no connection within 500 ms (timeout_ms)")).active
     assert [a.active for a in await transitions(task, tmp_path, name)] == [True]
 
@@ -212,9 +212,10 @@ async def test_values_are_of_before_while_the_link_is_there_again_and_no_cycle_h
     shown, feed = Shown(), LiveFeed([task.cell.name])
     task._publisher.server, task._publisher.feed = shown, feed  # type: ignore[assignment]
     seen = []
+    account = task._module._account
     for _ in range(3):
-        for connected in (True, False):
-            task._module._report_link(connected=connected, reason="" if connected else SILENT)
+        for change in (lambda: account.connect("the module"), lambda: account.disconnect(SILENT)):
+            change()
             seen.append(feed.views[task.cell.name].freshness)
     assert seen == [Freshness.STALE, Freshness.LOST] * 3
     assert shown.marks == ["stale", "bad"] * 3
