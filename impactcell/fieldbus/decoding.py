@@ -97,7 +97,7 @@ def capture_from_words(
     if not math.isnan(mass) and not LIGHTEST_KG <= mass <= HEAVIEST_KG:
         faults.append(f"{_where(registers, 'mass')}: {mass:g} kg cannot be")
         mass = math.nan
-    time_ns = _time_ns(header.get("cycle_time", 0))
+    time_ns = cycle_time_ns(header)
     if not 0 <= time_ns <= LATEST_NS:
         faults.append(f"register cycle_time ({registers['cycle_time'].address}): {time_ns:g} ns is no date")
         time_ns = 0
@@ -146,6 +146,10 @@ def _summary(registers: RegisterMap, header: Mapping[str, Value], faults: list[s
         if name in header and not abs(value) < FARTHEST:
             faults.append(f"register {name} ({registers[name].address}): not a number")
             value = math.nan
+        low, high = (name in registers and registers[name].full_scale) or (-math.inf, math.inf)
+        if value >= high or value <= low < 0.0:  # below 0 is neither figure: there it is not cut off
+            faults.append(f"{_where(registers, name)}: {value:g} is at full scale ({low:g} to {high:g})")
+            value = math.nan
         values.append(value)
     stds = [
         registers[name].si_std if name in registers else math.nan
@@ -160,8 +164,12 @@ def _where(registers: RegisterMap, name: str) -> str:
     return f"register {name} ({place})"
 
 
-def _time_ns(value: Value) -> float:
-    """Nanoseconds since 1970 of a time: a plain code is one, a time with a unit is in seconds; 0 for nan."""
+def cycle_time_ns(header: Mapping[str, Value]) -> float:
+    """Nanoseconds since 1970 at which a cycle was made; 0 where its header does not say, or says no number.
+
+    A plain code is in nanoseconds, a time with a unit in seconds.
+    """
+    value = header.get("cycle_time", 0)
     if isinstance(value, float):
         return 0 if math.isnan(value) else 1e9 * value
     return integer(value)

@@ -189,6 +189,37 @@ async def test_what_an_unseen_start_would_look_like_too_is_told_as_both(
     assert [line.split(" before it ")[1] for line in told] == [certain + doubt, certain]
 
 
+@pytest.mark.parametrize(
+    ("ends", "code", "is_cut_off"),
+    [
+        ((0, 65_535), 65_535, True),
+        ((0, 65_535), 65_534, False),
+        ((0, 60_000), 60_001, True),
+        ((0, 9), 0, False),
+    ],
+)
+async def test_a_figure_at_full_scale_is_none_and_named(
+    ends: tuple[int, int], code: int, is_cut_off: bool
+) -> None:
+    """A force beyond the amplifier's range shows its end; 0 N is no end of anything."""
+    peak_force = replace(SUMMARY["peak_force"], kind="u16", scale=0.01, offset=0.0, saturation=ends)
+    layout = replace(SUMMARY, registers=SUMMARY.registers | {"peak_force": peak_force})
+    device = ScriptedDevice(layout)
+    device.complete({}, velocity=0.05, peak_force=0.01 * code, sliding_distance=2e-3)
+    async with running(layout, device) as (_, _module, receptions):
+        (received,) = await take(receptions, 1)
+    assert received.capture.summary is not None
+    assert received.capture.summary.sliding_distance_m == pytest.approx(2e-3, rel=1e-2)
+    if is_cut_off:
+        (fault,) = received.faults
+        assert math.isnan(received.capture.summary.peak_force_n)
+        assert f"cell-1: cycle 1: register peak_force ({peak_force.address}): " in fault
+        assert f"is at full scale (0 to {0.01 * ends[1]:g})" in fault
+    else:
+        assert received.faults == ()
+        assert received.capture.summary.peak_force_n == pytest.approx(0.01 * code)
+
+
 async def test_a_restart_that_only_the_counter_tells() -> None:
     device = ScriptedDevice(SUMMARY)
     make_summary(device, 40)
