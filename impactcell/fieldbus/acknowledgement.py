@@ -34,12 +34,17 @@ class Acknowledgement:
         self._client = client
         self._numbers = numbers
         self._told: CycleId | None = None
+        self._void: CycleId | None = None
         self._failures = 0
         self._not_before_s, self._pause_s = -math.inf, _FIRST_PAUSE_S
 
     def begin_connection(self) -> None:
         """Take it that the module may have forgotten what it was told."""
         self._told = None
+
+    def begin_life(self) -> None:
+        """Take it that what is durable so far is of another life of the module, or of another module."""
+        self._void = self.durable
 
     async def send(self, status: StatusBlock) -> None:
         """Tell the module, unless that is done, or of no use now; one that refuses is told again later.
@@ -56,6 +61,9 @@ class Acknowledgement:
             If the link fails.
         """
         cycle_id, registers = self.durable, self._client.registers
+        if cycle_id == self._void:
+            return
+        self._void = None
         if cycle_id is None or cycle_id == self._told or _REGISTER not in registers:
             return
         if status.session != cycle_id.session or is_after(cycle_id.cycle, status.cycle_counter):

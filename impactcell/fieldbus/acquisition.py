@@ -22,6 +22,7 @@ from impactcell.fieldbus.cycle_dates import CycleDates
 from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.fetched_capture import NotFetched
 from impactcell.fieldbus.identity import IdentityCheck
+from impactcell.fieldbus.life_check import LifeCheck
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.module_account import ModuleAccount
 from impactcell.fieldbus.poll_schedule import PollSchedule
@@ -30,7 +31,7 @@ from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.fieldbus.status_reader import StatusReader
-from impactcell.fieldbus.taken_cycles import TakenCycles
+from impactcell.fieldbus.taken_cycles import NOTHING_BEFORE, TakenBefore, TakenCycles
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import CycleId, ModuleStatus
 
@@ -78,6 +79,7 @@ class ModuleAcquisition:
         self._ready = asyncio.Event()
         self._acknowledgement = Acknowledgement(self._log, self.register_client, self._numbers)
         self._said_given_up = False
+        self._life = LifeCheck(self._log, self.register_client, self._numbers)
         self._identity = IdentityCheck(cell, self.register_client, self._status_reader)
 
     @property
@@ -110,6 +112,11 @@ class ModuleAcquisition:
         level = logging.INFO if self._account.status.connected else logging.DEBUG
         self._account.disconnect(f"{self.cell}: connection closed", level)
 
+    @property
+    def serial_number(self) -> str:
+        """Of the module that is read; empty where that is not known."""
+        return self._taken.serial_number
+
     async def wait_connected(self) -> None:
         """Wait until the right module answers; `captures` must be running meanwhile."""
         await self._ready.wait()
@@ -136,7 +143,7 @@ class ModuleAcquisition:
                 await self._acknowledgement.send(status)
 
     async def captures(
-        self, after: CycleId | None = None, after_time_ns: int = 0
+        self, after: CycleId | None = None, after_time_ns: int = 0, before: TakenBefore = NOTHING_BEFORE
     ) -> AsyncGenerator[ReceivedCycle]:
         """Yield each cycle after `after` once, in order; ends only when it is closed.
 
@@ -146,8 +153,11 @@ class ModuleAcquisition:
             Last cycle that is durable; None: begin with the oldest that the module still has.
         after_time_ns : int
             Its own time; 0 where that is not known.
+        before : TakenBefore, optional
+            What was taken besides; without it, cycles of a session that comes again may come twice.
         """
-        taken = self._taken = TakenCycles(after, after_time_ns, self.registers.slots, self._numbers)
+        slots = self.registers.slots
+        taken = self._taken = TakenCycles(after, after_time_ns, slots, self._numbers, before)
         backoff, schedule = Backoff(), PollSchedule()
         loop = asyncio.get_running_loop()
         newest = CycleId(0, 0)
@@ -159,13 +169,18 @@ class ModuleAcquisition:
                 newest_now = CycleId(status.session, status.cycle_counter)
                 schedule.record_poll(sent_s, loop.time(), new=newest_now != newest)
                 newest = newest_now
-                target = choice.target(taken.last, status, loop.time())
+                if self._is_another_module(taken) or not await self._is_settled(taken):
+                    await asyncio.sleep(schedule.delay_s(loop.time()))
+                    continue
+                target = choice.target(taken.last, status, loop.time(), is_new_life=taken.is_new_life)
                 if target is None:
                     backoff.reset()
                     await asyncio.sleep(schedule.delay_s(loop.time()))
                     continue
                 await self.find_window()
                 await self._identity.check_for(target.cycle_id)
+                if self._is_another_module(taken):
+                    continue
                 fetched = await self._reader.fetch(target, taken)
             except FieldbusError as error:
                 await self._disconnect(error)
@@ -183,26 +198,28 @@ class ModuleAcquisition:
                 newest = replace(newest, cycle=target.counter)
             if fetched.readable:  # not for the status block alone, which says nothing of the window
                 backoff.reset()
+            last = taken.last
+            restarted = target.restarted or taken.is_other_life(target.cycle_id.session)
+            if restarted:
+                self._acknowledgement.begin_life()
             capture = replace(fetched.capture, session=target.cycle_id.session)
             is_newest = target.cycle_id == newest
             capture = self._dates.dated(
                 capture,
                 readable=fetched.readable,
                 is_newest=is_newest,
-                restarted=target.restarted,
+                restarted=restarted,
                 now_s=loop.time(),
             )
-            last = taken.last
             schedule.update(
                 1e-9 * fetched.capture.time_ns or loop.time(),
-                cycles_after(last.cycle, target.cycle_id.cycle) if last and not target.restarted else 0,
+                cycles_after(last.cycle, target.cycle_id.cycle) if last and not restarted else 0,
                 newest=is_newest,
             )
             taken.add(target.cycle_id, fetched.header, fetched.capture.time_ns)
-            received = ReceivedCycle(
-                capture, target.cycle_id, target.missed, target.restarted, fetched.faults
-            )
-            self._account.count(received, readable=fetched.readable)
+            received = ReceivedCycle(capture, target.cycle_id, target.missed, restarted, fetched.faults)
+            self._account.count(received, readable=fetched.readable, is_doubtful=self._life.is_doubtful)
+            self._life.is_doubtful = False
             yield received
             if taken.last == newest:  # nothing waits behind it
                 await asyncio.sleep(schedule.delay_s(loop.time()))
@@ -239,6 +256,7 @@ class ModuleAcquisition:
         self._identity.forget()
         await self._identity.check()
         self._acknowledgement.begin_connection()
+        self._life.begin_connection()
 
     async def _poll(self) -> StatusBlock:
         if not self._client.connected:
@@ -246,11 +264,29 @@ class ModuleAcquisition:
         self._say_given_up()
         status = await self.read_status()
         await self._identity.check_word_order(status)
-        await self._acknowledgement.send(status)
         if not self._ready.is_set():
             self._account.connect(self.link)
             self._ready.set()
         return status
+
+    def _is_another_module(self, taken: TakenCycles) -> bool:
+        """Whether another module answers than before; its cycles are then read from the oldest on."""
+        if not (before := taken.meet(self._identity.serial_number)):
+            return False
+        self._log.warning(
+            "another module answers (serial number %s instead of %s): all is read that it holds and that was "
+            "not taken of it before; of what it has made besides nothing counts as missed",
+            taken.serial_number, before,
+        )  # fmt: skip
+        return True
+
+    async def _is_settled(self, taken: TakenCycles) -> bool:
+        """Whether it is settled which life of the module is read; it is then told what is stored of that."""
+        if self._shown is None or not await self._life.is_settled(self._shown, taken):
+            return False
+        if taken.last is not None and not taken.is_new_life:
+            await self._acknowledgement.send(self._numbers.status(self._shown, taken.last))
+        return True
 
     async def _disconnect(self, error: FieldbusError) -> None:
         """Close the connection after an error and say why; the log, once for each kind of reason."""

@@ -16,16 +16,16 @@ import numpy as np
 
 from impactcell.errors import FieldbusError, ModbusExceptionError, NotDecimalError, ProtocolError
 from impactcell.fieldbus import decoding
+from impactcell.fieldbus.capture_header import CaptureHeader, at_rest
 from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_after
 from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.fetched_capture import FetchedCapture, NotFetched
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.register_image import RegisterImage
-from impactcell.fieldbus.registers import WIRE, Register, RegisterMap, Value, Words, registers_crc32
+from impactcell.fieldbus.registers import WIRE, Value, Words, registers_crc32
 from impactcell.fieldbus.request_batching import PartialBlock
 from impactcell.fieldbus.status_block import integer
 from impactcell.fieldbus.taken_cycles import TakenCycles
-from impactcell.records import CycleId
 
 _AT_ONCE: Final = 5
 """Readings of one cycle that may be discarded one after the other; then the status block is looked at."""
@@ -76,7 +76,7 @@ class CaptureReader:
         self._client = client
         self._registers = client.registers
         self.numbers = CycleNumbers.of(client.registers["cycle_counter"].kind)
-        self._spans = _spans(client.registers)
+        self._header = CaptureHeader(client.registers, self.numbers)
         self._partial: _PartialCapture | None = None
         self._target: NextCapture | None = None
         self._attempts = 0
@@ -159,18 +159,18 @@ class CaptureReader:
         if self._partial is not None:
             image, partial = await client.read_header(), self._partial
             same_sequence = image.values.get("window_sequence") == partial.header.get("window_sequence")
-            if same_sequence and self._identifying(image) == partial.identity:
+            if same_sequence and self._header.identity(image) == partial.identity:
                 return partial
             self._partial = None
             self.discarded += 1
         image = await client.read_header(target.slot)
         if image.values.get("window_slot", target.slot) != target.slot:
             image = await client.read_header()
-        header, identity = image.values, self._identifying(image)
+        header, identity = image.values, self._header.identity(image)
         if self._is_none_since_start(target, header):
             return NotFetched.NOT_MADE
-        if _at_rest(header) and header.get("window_slot", target.slot) == target.slot:
-            wanted, shown = target.cycle_id, self._shown(header, target)
+        if at_rest(header) and header.get("window_slot", target.slot) == target.slot:
+            wanted, shown = target.cycle_id, self._header.shown(header, target.cycle_id)
             if taken.holds(shown, identity, integer(header.get("cycle_time", 0)), target):
                 return NotFetched.TAKEN
             if shown != wanted:
@@ -187,19 +187,9 @@ class CaptureReader:
         cycle_id = target.cycle_id
         return not (cycle_id.session or self.numbers.shown(cycle_id.cycle) or decoding.tells_of_a_tap(header))
 
-    def _shown(self, header: Mapping[str, Value], target: NextCapture) -> CycleId:
-        """Which cycle a header is of, as far as it says."""
-        name = "window_cycle" if "window_cycle" in header else "cycle_counter"
-        cycle = self.numbers.number(integer(header[name]), near=target.cycle_id.cycle)
-        return CycleId(integer(header.get("window_session", target.cycle_id.session)), cycle)
-
     def _blocks(self, header: Mapping[str, Value], *, again: bool = False) -> dict[str, PartialBlock]:
         counts = decoding.sample_counts(self._registers, header)
         return {n: self._client.partial_block(n, count, again=again) for n, count in counts.items()}
-
-    def _identifying(self, image: RegisterImage) -> bytes:
-        """Words of a header that stay the same while its capture does."""
-        return b"".join(image.words(first, end).tobytes() for first, end in self._spans)
 
     def _covered(self, image: RegisterImage) -> Words:
         """Words of a header that its CRC covers."""
@@ -209,10 +199,10 @@ class CaptureReader:
     async def _read_samples(self, partial: _PartialCapture) -> str | None:
         """Read the samples and what proves them; return why the reading is of no use, None if it is good."""
         registers, header, target = self._registers, partial.header, partial.target
-        if not _at_rest(header):
+        if not at_rest(header):
             return "the module was changing its window"
         slot = header.get("window_slot", target.slot)
-        if (slot, self._shown(header, target)) != (target.slot, target.cycle_id):
+        if (slot, self._header.shown(header, target.cycle_id)) != (target.slot, target.cycle_id):
             name = "window_slot" if "window_slot" in registers else "window_cycle"
             return f"register {name} ({registers[name].address}) shows {header[name]}, which is not asked for"
         provable = "capture_crc32" in registers
@@ -258,7 +248,7 @@ class CaptureReader:
         await self._client.modbus.complete(*again.values())
         image = await self._client.read_header()
         agree = all(again[name].words().tobytes() == partial.blocks[name].words().tobytes() for name in again)
-        if agree and _at_rest(image.values) and self._identifying(image) == partial.identity:
+        if agree and at_rest(image.values) and self._header.identity(image) == partial.identity:
             return None
         return "two readings of it differ: the module was changing it"
 
@@ -279,22 +269,3 @@ def _is_of_request(error: FieldbusError, *, progressed: bool) -> bool:
     """Whether the fault lies in what was asked for, and not in the link, or in a module that is busy."""
     code = error.code if isinstance(error, ModbusExceptionError) else None
     return isinstance(error, NotDecimalError) or code in _REQUEST_FAULTS or bool(code and progressed)
-
-
-def _at_rest(header: Mapping[str, Value]) -> bool:
-    """Whether the window was at rest, as far as the module says."""
-    sequence = header.get("window_sequence", 0)
-    return isinstance(sequence, int) and sequence % 2 == 0 and header.get("capture_ready", 1) == 1
-
-
-def _spans(registers: RegisterMap) -> list[tuple[Register, int]]:
-    """Give pieces of what identifies a capture, each from a register to an address."""
-    spans: list[tuple[Register, int]] = []
-    for register in registers.header():
-        if register.name in ("window_sequence", "capture_ready"):
-            continue
-        if spans and spans[-1][0].table == register.table and spans[-1][1] == register.address:
-            spans[-1] = spans[-1][0], register.end
-        else:
-            spans.append((register, register.end))
-    return spans

@@ -1,5 +1,6 @@
 """Which cycle to read next, from what came of those before; tells of a module that never shows it."""
 
+from dataclasses import replace
 from typing import Final
 
 from impactcell.fieldbus.capture_ring import NextCapture, is_after, is_consistent, next_capture
@@ -12,6 +13,8 @@ from impactcell.records import CycleId
 
 _DISAGREEMENTS: Final = 5
 """So often status block and window may disagree about the oldest cycle; then the next one is tried."""
+_NO_SESSION: Final = -1
+"""Of a life that is over: no module shows it."""
 PATIENCE_S: Final = 10.0
 """So long a status block and what the module shows may contradict each other before it is told: a gateway
 that answers out of a store, or a module that starts, is through by then."""
@@ -29,8 +32,20 @@ class CycleChoice:
         self._told = False
         self._seen: CycleId | None = None
 
-    def target(self, last: CycleId | None, status: StatusBlock, now_s: float) -> NextCapture | None:
-        """Choose the cycle to read; None where there is none, or the status block contradicts itself."""
+    def target(
+        self, last: CycleId | None, status: StatusBlock, now_s: float, *, is_new_life: bool = False
+    ) -> NextCapture | None:
+        """Choose the cycle to read; None where there is none, or the status block contradicts itself.
+
+        Parameters
+        ----------
+        last : CycleId or None
+            Last cycle taken; None: none ever.
+        status : StatusBlock
+        now_s : float
+        is_new_life : bool
+            Whether the module was started anew since `last`, though it may show the same session.
+        """
         if not is_consistent(status.cycle_counter, status.ring):
             held = [cycle for cycle in status.ring if cycle]
             shown = f"{min(held)} to {max(held)}" if held else "no cycle at all"
@@ -38,9 +53,12 @@ class CycleChoice:
             return None
         skip = self._overwritten // 2 + self._disagreements // _DISAGREEMENTS
         newest = CycleId(status.session, status.cycle_counter)
-        if last is not None and newest.session == last.session and not is_after(last.cycle, newest.cycle):
+        goes_on = last is not None and newest.session == last.session and not is_new_life
+        if last is not None and goes_on and not is_after(last.cycle, newest.cycle):
             self._seen = newest
         seen = self._seen.cycle if self._seen and last and self._seen.session == last.session else None
+        if is_new_life and last is not None:
+            last = replace(last, session=_NO_SESSION)
         target = next_capture(last, newest.session, newest.cycle, status.ring, skip, seen, self._period)
         if target is None:
             self._agree()
@@ -54,7 +72,7 @@ class CycleChoice:
         cycle = target.cycle_id.cycle
         self._log.debug("%s", reason.value, cycle=cycle)
         self._disagreements += not target.restarted and reason is NotFetched.NOT_SHOWN
-        if reason is NotFetched.NOT_SHOWN:
+        if reason in (NotFetched.NOT_SHOWN, NotFetched.TAKEN):
             self._contradict(f"cycle_counter shows {target.counter}, but {reason.value}", now_s)
 
     def record_success(self) -> None:

@@ -9,8 +9,8 @@ from impactcell.records import MM_PER_MIN
 
 _WITHOUT: Final = {
     "ring_cycle": "one cycle is held: those made while it is not read are lost, and counted",
-    "session": "a restart of the module is told only by a cycle counter that goes back, and where no clock "
-    "tells, not before the next cycle",
+    "session": "a restart of the module is told only by a cycle counter that goes back, or, after an "
+    "outage, while its ring holds the last cycle; where no clock tells, not before the next cycle",
     "window_cycle": "that samples and figures are of the cycle counted last is the module's word: it has to "
     "show them before it counts",
     "cycle_time": "the time of a cycle is when it was read",

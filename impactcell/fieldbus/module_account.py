@@ -13,6 +13,11 @@ from impactcell.records import ModuleStatus
 
 _NO_SESSION: Final = "; or it was started anew, and how many are lost is not known: no register session tells"
 """Said of a loss over an outage."""
+_NOTHING_TELLS: Final = (
+    "nothing tells whether the module was started anew before it, and has overwritten others: it has no "
+    "register session"
+)
+"""Said of an outage without a loss."""
 
 
 class ModuleAccount:
@@ -36,7 +41,7 @@ class ModuleAccount:
 
     def __init__(self, cell: str, log: CellLogger, on_change: Callable[[], None] | None) -> None:
         self.status = ModuleStatus()
-        self.connections = self._counted_on = 0  # the latter: those that there were at the last cycle
+        self.connections = 0
         self._cell = cell
         self._log = log
         self._on_change = on_change
@@ -59,8 +64,11 @@ class ModuleAccount:
                 self._log.log(level, "%s", reason.removeprefix(f"{self._cell}: "))
             self._tell()
 
-    def count(self, received: ReceivedCycle, *, readable: bool) -> None:
-        """Count a cycle, and log what was lost before it, and what is wrong with it."""
+    def count(self, received: ReceivedCycle, *, readable: bool, is_doubtful: bool) -> None:
+        """Count a cycle, and log what was lost before it, and what is wrong with it.
+
+        `is_doubtful`: nothing tells that the module was not started anew before it.
+        """
         status = self.status
         self.status = replace(
             status,
@@ -73,13 +81,13 @@ class ModuleAccount:
         if received.missed:
             are, them = ("is", "it") if received.missed == 1 else ("are", "them")
             why = "was started anew, or had overwritten" if received.restarted else "had overwritten"
-            tells = received.restarted or received.cycle_id.session or self.connections == self._counted_on
-            doubt = "" if tells else _NO_SESSION
+            doubt = _NO_SESSION if is_doubtful and not received.restarted else ""
             self._log.warning(
                 "%d before it %s lost: the module %s %s%s",
                 received.missed, are, why, them, doubt, cycle=cycle,
             )  # fmt: skip
-        self._counted_on = self.connections
+        elif is_doubtful and not received.restarted:
+            self._log.info("%s", _NOTHING_TELLS, cycle=cycle)
         for fault in received.faults:
             said = fault.removeprefix(f"{self._cell}: cycle {cycle}").lstrip(": ")
             self._log.warning("%s", said, cycle=cycle)

@@ -2,15 +2,18 @@
 
 import contextlib
 import sqlite3
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 from impactcell.errors import JournalDamagedError, JournalError
 from impactcell.journal.capture_codec import decode_capture
 from impactcell.journal.checksums import CheckedTables
-from impactcell.records import CycleId
+from impactcell.records import Capture, CycleId
 
+RECENT: Final = 2**16
+"""Cycles that are looked through for sessions of before: a tenth of a second."""
 _NEXT = "SELECT seq, blob FROM captures WHERE seq >= ? ORDER BY seq LIMIT 1"
 _ONE = "SELECT blob FROM captures WHERE seq = ?"
 
@@ -79,6 +82,46 @@ def last_cycle_id(database: sqlite3.Connection, tables: CheckedTables) -> CycleI
             capture = decode_capture(None if stored is None else stored.blob)
             return CycleId(capture.session, capture.cycle)
     return None
+
+
+def last_of_sessions(database: sqlite3.Connection, tables: CheckedTables) -> list[tuple[CycleId, int]]:
+    """Give the last cycle of each session among the last `RECENT`, and its time, in their order."""
+    query = (
+        "SELECT * FROM cycles WHERE seq IN (SELECT max(seq) FROM cycles "
+        "WHERE seq > (SELECT max(seq) FROM cycles) - ? GROUP BY session) ORDER BY seq"
+    )
+    whole = (row for row in database.execute(query, (RECENT,)) if tables.is_whole("cycles", row))
+    named = (dict(zip(tables.columns["cycles"], row, strict=True)) for row in whole)
+    return [(CycleId(row["session"], row["cycle"]), row["time_ns"]) for row in named]
+
+
+def decoded_captures(
+    stored_captures: Iterable[StoredCapture], path: Path, damaged: Callable[[str], None] | None
+) -> Iterator[Capture]:
+    """Yield captures with the batch that the cell took each for.
+
+    Parameters
+    ----------
+    stored_captures : iterable of StoredCapture
+    path : Path
+        Of their journal, for messages.
+    damaged : callable, optional
+        Told of each that cannot be read, by its cycle; the others follow.
+
+    Raises
+    ------
+    JournalDamagedError
+        At the first that cannot be read, without `damaged`.
+    """
+    for stored in stored_captures:
+        try:
+            capture = decode_capture(stored.blob)
+            yield replace(capture, batch_id=stored.batch_id or capture.batch_id)
+        except JournalDamagedError as error:
+            name = f"cycle {stored.cycle}" if stored.cycle else f"the {stored.seq}th cycle"
+            if damaged is None:
+                raise JournalDamagedError(f"{path}: {name}: {error}") from error
+            damaged(f"{name}: {error}")
 
 
 def salvaged_state(path: Path) -> bytes | None:

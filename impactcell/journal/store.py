@@ -9,22 +9,21 @@ A `Journal` is used from one thread at a time; `impactcell.service.worker` gives
 import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from types import TracebackType
 from typing import Self
 
-from impactcell.errors import JournalDamagedError, JournalError
+from impactcell.errors import JournalError
+from impactcell.journal import salvage
 from impactcell.journal.audit_entries import AuditEntry, stored_audit
-from impactcell.journal.capture_codec import decode_capture, encode_capture
+from impactcell.journal.capture_codec import encode_capture
 from impactcell.journal.checksums import CheckedTables
 from impactcell.journal.database import Upgrade, check_name, errors, open_database, set_aside
 from impactcell.journal.history import HistoryQuery, Page, StoredValue, stored_alarms, stored_values
 from impactcell.journal.lock import lock_journal
 from impactcell.journal.presence import FilePresence
 from impactcell.journal.retention import Retention, borne_out_ns, prune
-from impactcell.journal.salvage import last_cycle_id, stored_captures
 from impactcell.journal.schema import cycle_row
 from impactcell.journal.stored_forms import ALARM, load_alarms
 from impactcell.records import Alarm, Capture, CycleId, Snapshot
@@ -61,7 +60,6 @@ class Journal:
         self, path: Path, cell: str | None, *, read_only: bool = False, upgrade: Upgrade | None = None
     ) -> None:
         self.path = path
-        self._last_stored: CycleId | None = None
         with errors(self.path):
             check_name(path)
             if read_only and not path.is_file():
@@ -81,14 +79,12 @@ class Journal:
         with errors(self.path):
             self._presence.check()
             self._tables = CheckedTables(self._db, self.path)
-        self._last_stored = None
+        self._last_stored: CycleId | None = None
 
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -123,17 +119,27 @@ class Journal:
     @property
     def cell(self) -> str:
         """Name of the cell this journal belongs to."""
-        return self._meta("cell")
+        return self.meta("cell")
 
     @property
     def model(self) -> str:
         """Model the recording cell runs with, as JSON; empty before the first."""
-        return self._meta("model")
+        return self.meta("model")
 
     def store_model(self, model: str) -> None:
         """Keep the model that the cell runs with from now on."""
+        self.store_meta("model", model)
+
+    def store_meta(self, key: str, value: str) -> None:
+        """Keep something that is known of the cell or its module."""
         with self._transaction():
-            self._tables.insert("meta", {"key": "model", "value": model})
+            self._tables.insert("meta", {"key": key, "value": value})
+
+    def meta(self, key: str) -> str:
+        """Return what `store_meta` keeps; empty where there is nothing."""
+        with errors(self.path):
+            rows = self._tables.rows("meta", "SELECT * FROM meta WHERE key = ?", key)
+            return str(rows[0]["value"]) if rows else ""
 
     def append(
         self, capture: Capture, snapshot: Snapshot, state: bytes, changed: Sequence[Alarm] = ()
@@ -190,13 +196,17 @@ class Journal:
     def last_cycle_id(self) -> CycleId | None:
         """Return the last durable cycle; None in a new journal.
 
-        Of a damaged row its capture tells which cycle it was; where that is damaged as well, or was dropped,
-        the row does not count.
+        Of a damaged row its capture tells which cycle it was; without a whole one the row does not count.
         """
         if self._last_stored is None:
             with errors(self.path):
-                self._last_stored = last_cycle_id(self._db, self._tables)
+                self._last_stored = salvage.last_cycle_id(self._db, self._tables)
         return self._last_stored
+
+    def last_of_sessions(self) -> list[tuple[CycleId, int]]:
+        """Return the last cycle of each session that came lately, and its time; see `journal.salvage`."""
+        with errors(self.path):
+            return salvage.last_of_sessions(self._db, self._tables)
 
     def captures(
         self,
@@ -224,17 +234,11 @@ class Journal:
             At the first that cannot be read, without `damaged`.
         """
         with errors(self.path):
-            for stored in stored_captures(self._db, newest):
-                if not (first_cycle or 0) <= stored.cycle <= (math.inf if last_cycle is None else last_cycle):
-                    continue
-                try:
-                    capture = decode_capture(stored.blob)
-                    yield replace(capture, batch_id=stored.batch_id or capture.batch_id)
-                except JournalDamagedError as error:
-                    name = f"cycle {stored.cycle}" if stored.cycle else f"the {stored.seq}th cycle"
-                    if damaged is None:
-                        raise JournalDamagedError(f"{self.path}: {name}: {error}") from error
-                    damaged(f"{name}: {error}")
+            first, last = first_cycle or 0, math.inf if last_cycle is None else last_cycle
+            wanted = (
+                each for each in salvage.stored_captures(self._db, newest) if first <= each.cycle <= last
+            )
+            yield from salvage.decoded_captures(wanted, self.path, damaged)
 
     def values(self, variable: str, query: HistoryQuery) -> Page[StoredValue]:
         """Return stored values of a variable; see `impactcell.journal.history`."""
@@ -276,11 +280,6 @@ class Journal:
         with errors(self.path):
             rows = self._tables.rows(table, f"SELECT * FROM {table}")  # noqa: S608 - from above
         return bytes(rows[0]["blob"]) if rows else None
-
-    def _meta(self, key: str) -> str:
-        with errors(self.path):
-            rows = self._tables.rows("meta", "SELECT * FROM meta WHERE key = ?", key)
-        return str(rows[0]["value"]) if rows else ""
 
     def _put_alarms(self, changed: Sequence[Alarm]) -> None:
         for alarm in changed:

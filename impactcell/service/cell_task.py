@@ -195,11 +195,10 @@ class CellTask:
     async def _acquire(self) -> None:
         await self.worker.warm_up()
         self._module.note_durable(self.worker.durable)
+        last_ns = 0 if self.worker.snapshot is None else self.worker.snapshot.time_ns
+        before = await self.worker.taken_before()
         async with contextlib.aclosing(
-            self._module.captures(
-                self.worker.last,
-                0 if self.worker.snapshot is None else self.worker.snapshot.time_ns,
-            )
+            self._module.captures(self.worker.last, last_ns, before)
         ) as received_cycles:
             async for received in received_cycles:
                 await self._process(received)
@@ -214,6 +213,7 @@ class CellTask:
             received.faults,
             restarted=received.restarted,
         )
+        await self.worker.note_serial_number(self._module.serial_number)
         if task is not None:
             await self.worker.run(partial(task.update_friction, result.snapshot))
         snapshot, notes = result.snapshot, result.notes

@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 
 from impactcell.errors import JournalDamagedError, JournalError, JournalGoneError
+from impactcell.fieldbus.taken_cycles import NOTHING_BEFORE, TakenBefore
 from impactcell.journal.database import set_aside
 from impactcell.journal.retention import NS_PER_DAY, SETTLED_NS, Retention
 from impactcell.journal.salvage import salvaged_state
@@ -24,6 +25,8 @@ PRUNE_EVERY = 256
 """Cycles between two looks at what the journal may drop."""
 AHEAD_NS = 7 * NS_PER_DAY
 """A clock further ahead of the cycles before is told, nanoseconds; a machine may stand over a holiday."""
+_SERIAL = "serial_number"
+"""Under what a journal keeps which module made its last cycle."""
 
 Entry = Callable[[Journal], None]
 
@@ -78,6 +81,8 @@ class JournalWriter:
         """The last cycle that is safely stored; None where there is none."""
         self.lost = 0
         """Cycles that were never stored; an acknowledgement of a later one covers them."""
+        self.serial_number = ""
+        """Of the module that made the last cycle; empty where that is not known."""
         self._events: list[str] = []
         self._keep = keep
         self._log = CellLogger(logging.getLogger(__name__), cell)
@@ -120,6 +125,22 @@ class JournalWriter:
         """Write the model that the cell runs with; a journal that is begun anew gets it first."""
         self._model = model
         self.store(lambda journal: journal.store_model(model))
+
+    def taken_before(self) -> TakenBefore:
+        """Give what the journal knows of what was taken before; nothing where it cannot be read."""
+        if self.journal is None:
+            return NOTHING_BEFORE
+        try:
+            self.serial_number = self.journal.meta(_SERIAL)
+            return TakenBefore(self.journal.last_of_sessions(), self.serial_number)
+        except JournalError as error:
+            self._log.warning("cycles of sessions before the last one may come twice: %s", error)
+            return NOTHING_BEFORE
+
+    def store_serial_number(self, serial_number: str) -> None:
+        """Write which module the cell reads; a journal that is begun anew gets it, too."""
+        self.serial_number = serial_number
+        self.store(lambda journal: journal.store_meta(_SERIAL, serial_number))
 
     def cycle(self, cycle_id: CycleId, entry: Entry) -> None:
         """Write a cycle."""
@@ -218,6 +239,8 @@ class JournalWriter:
         try:
             aside = journal.begin_anew(damaged=damaged)
             journal.store_model(self._model)
+            if self.serial_number:
+                journal.store_meta(_SERIAL, self.serial_number)
         except JournalError as error:
             raise JournalGoneError(f"{journal.path}: cannot be begun anew: {error}") from error
         self._broken = None

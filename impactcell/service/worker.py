@@ -12,6 +12,7 @@ from typing import TypeVar
 from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, RuleResult, Transition
 from impactcell.cell import CellDesign, CellState, StepResult
+from impactcell.fieldbus.taken_cycles import TakenBefore
 from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
@@ -93,6 +94,15 @@ class CellWorker:
         """The last cycle that is safely stored, None: none yet; without a journal the last one taken in."""
         writer = self._journal_writer
         return self.last if writer.journal is None else writer.durable
+
+    async def taken_before(self) -> TakenBefore:
+        """Return what the journal knows of what was taken before; nothing without a journal."""
+        return await self.run(self._journal_writer.taken_before)
+
+    async def note_serial_number(self, serial_number: str) -> None:
+        """Keep which module made the cycle that was taken in last."""
+        if serial_number != self._journal_writer.serial_number:
+            await self.run(lambda: self._journal_writer.store_serial_number(serial_number))
 
     @property
     def lost(self) -> int:

@@ -15,6 +15,7 @@ from impactcell.fieldbus.capture_ring import CYCLE_PERIOD
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap, Words
+from impactcell.fieldbus.taken_cycles import TakenBefore
 from impactcell.fieldbus.transports import transport_for
 from impactcell.records import CycleId, ModuleStatus
 from simulator.faults import Fault, FaultKind
@@ -65,7 +66,7 @@ def assert_whole(received: ReceivedCycle) -> None:
 async def running(
     fpga: RegisterMap,
     device: ScriptedDevice,
-    after: CycleId | tuple[CycleId, int] | None = None,
+    after: CycleId | tuple[CycleId, int] | tuple[CycleId, int, TakenBefore] | None = None,
     statuses: list[ModuleStatus] | None = None,
     **link: Any,
 ) -> AsyncIterator[tuple[ModbusServer, ModuleAcquisition, AsyncIterator[ReceivedCycle]]]:

@@ -15,6 +15,7 @@ from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, EventKind, Message, RuleResult
 from impactcell.alarms.rules import module_connection
 from impactcell.errors import ForeignJournalError, JournalFullError
+from impactcell.fieldbus.taken_cycles import TakenBefore
 from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.retention import Retention
@@ -58,6 +59,26 @@ async def test_an_entry_that_can_never_be_stored_blocks_nothing(
     assert (worker.journal_fault, worker.lost) == ("", 1)
     await worker.close()
     assert cycles(tmp_path / "j") == [1, 3]
+
+
+async def test_what_was_taken_before_is_known_after_a_restart(
+    tmp_path: Path, design: core.CellDesign
+) -> None:
+    """The last cycle of each session, in the order in which they were left, and which module made it."""
+    worker = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
+    assert await worker.taken_before() == TakenBefore([], "")
+    for number, (session, cycle) in enumerate([(7, 1), (7, 2), (99, 1), (3, 8), (99, 2)]):
+        capture = replace(make_capture(cycle, session=session), time_ns=10**18 + number)
+        await process(worker, capture)
+        await worker.note_serial_number("SN1" if session == 7 else "SN2")
+    await worker.close()
+    worker = CellWorker(design, Journal(tmp_path / "j", "c"), Retention())
+    before = await worker.taken_before()
+    await worker.close()
+    lives = [(CycleId(7, 2), 10**18 + 1), (CycleId(3, 8), 10**18 + 3), (CycleId(99, 2), 10**18 + 4)]
+    assert before == TakenBefore(lives, "SN2")
+    with Journal(tmp_path / "j", "c") as journal:
+        assert journal.cell == "c"
 
 
 async def test_no_cycle_waits_for_the_journal_to_be_tidied(
