@@ -57,8 +57,11 @@ GERMAN: Final = {
         f"kein Journal, nicht einmal eine Datenbank; {AS_IT_IS}; {ANOTHER}",
     r"a database, but no journal of impactcell; it is left as it is; name another file":
         f"eine Datenbank, aber kein Journal von impactcell; {AS_IT_IS}; {ANOTHER}",
-    r"another service writes this journal; end it first":
-        "ein anderer Dienst schreibt dieses Journal; ihn zuerst beenden",
+    r"another service writes this journal; end it first: to remove its lock does not help":
+        "ein anderer Dienst schreibt dieses Journal; ihn zuerst beenden: die Sperre zu entfernen hilft nicht",
+    r"another service has begun to write this journal, for its lock was removed; end one of them":
+        "ein anderer Dienst schreibt dieses Journal inzwischen auch, denn seine Sperre wurde entfernt; einen "
+        "der beiden beenden",
     r"the journal of cell '(?P<other>.+)', not of '(?P<own>.+)'; name another file":
         rf"das Journal der Zelle „\g<other>“, nicht von „\g<own>“; {ANOTHER}",
     r"the journal(?: of cell '(?P<cell>.+)')? has format (?P<format>\d+), this version of the program knows "

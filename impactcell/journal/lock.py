@@ -7,7 +7,7 @@ import stat
 from pathlib import Path
 from typing import IO
 
-from impactcell.errors import JournalError
+from impactcell.errors import JournalError, JournalUnavailableError
 from impactcell.journal.database import check_header
 
 
@@ -28,18 +28,61 @@ def lock_journal(path: Path) -> IO[str]:
         Another service holds it, or the path is no plain file with one name.
     """
     check_file(path)
-    file = Path(os.path.realpath(path))
-    lock_file = file.with_name(f"{file.name}.lock")
+    lock_file = _lock_file(path)
     # With a lock file somebody in this process may hold locks that a look at the journal would drop.
     if not lock_file.exists():
         check_header(path)
+    try:
+        return _taken(lock_file)
+    except BlockingIOError as error:
+        raise JournalError(
+            f"{path}: another service writes this journal; end it first: to remove its lock does not help"
+        ) from error
+
+
+def kept_lock(lock: IO[str], path: Path) -> IO[str]:
+    """Return the lock that is held; taken anew where somebody has removed its file.
+
+    Raises
+    ------
+    JournalUnavailableError
+        Another service has taken it meanwhile.
+    """
+    lock_file = _lock_file(path)
+    held = os.fstat(lock.fileno())
+    try:
+        there = lock_file.stat()
+        if (there.st_dev, there.st_ino) == (held.st_dev, held.st_ino):
+            return lock
+    except FileNotFoundError:
+        pass
+    try:
+        taken = _taken(lock_file)
+    except BlockingIOError as error:
+        raise JournalUnavailableError(
+            f"{path}: another service has begun to write this journal, for its lock was removed; end one of "
+            "them"
+        ) from error
+    except OSError:  # nobody can take it there
+        return lock
+    lock.close()
+    return taken
+
+
+def _lock_file(path: Path) -> Path:
+    file = Path(os.path.realpath(path))
+    return file.with_name(f"{file.name}.lock")
+
+
+def _taken(lock_file: Path) -> IO[str]:
+    """Take a lock; raises BlockingIOError where somebody else holds it."""
     flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NONBLOCK
     lock = os.fdopen(os.open(lock_file, flags, 0o644), "w")
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
+    except BlockingIOError:
         lock.close()
-        raise JournalError(f"{path}: another service writes this journal; end it first") from error
+        raise
     return lock
 
 

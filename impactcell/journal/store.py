@@ -21,7 +21,7 @@ from impactcell.journal.capture_codec import encode_capture
 from impactcell.journal.checksums import CheckedTables
 from impactcell.journal.database import Upgrade, check_name, errors, open_database, set_aside
 from impactcell.journal.history import HistoryQuery, Page, StoredValue, stored_alarms, stored_values
-from impactcell.journal.lock import lock_journal
+from impactcell.journal.lock import kept_lock, lock_journal
 from impactcell.journal.presence import FilePresence
 from impactcell.journal.retention import Retention, borne_out_ns, prune
 from impactcell.journal.schema import cycle_row
@@ -288,6 +288,7 @@ class Journal:
     @contextmanager
     def _transaction(self) -> Iterator[None]:
         with errors(self.path):
+            self._lock = self._lock and kept_lock(self._lock, self.path)
             self._db.execute("BEGIN IMMEDIATE")
             try:
                 yield

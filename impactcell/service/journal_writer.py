@@ -263,3 +263,11 @@ class JournalWriter:
                 self.fault,
             )
         self.journal.close()
+        name = self.journal.path.name
+        log = self.journal.path.with_name(f"{name}-wal")
+        if log.exists() and log.stat().st_size:
+            self._log.warning(
+                "%s could not be emptied into %s: the disk is full, or another program has the file open. "
+                "What is stored is in both: to copy the journal, copy %s and %s together",
+                log, name, name, log.name,
+            )  # fmt: skip

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from impactcell.errors import ForeignJournalError, JournalError, JournalFullError, JournalUnavailableError
+from impactcell.german.journal_faults import german_journal_fault
 from impactcell.journal.database import errors
 from impactcell.journal.refusal import refusal
 from impactcell.journal.store import Journal
@@ -15,6 +16,29 @@ from impactcell.journal.store import Journal
 def test_a_second_writer_is_refused(tmp_path: Path) -> None:
     with Journal(tmp_path / "j", "c"), pytest.raises(JournalError, match="another service writes"):
         Journal(tmp_path / "j", "c")
+
+
+def test_a_lock_that_is_removed_lets_no_second_writer_in(tmp_path: Path) -> None:
+    """One that nobody else has taken is taken again."""
+    lock = tmp_path / "j.lock"
+    with Journal(tmp_path / "j", "c") as journal:
+        lock.unlink()
+        journal.store_model("one")
+        assert lock.exists()
+        with pytest.raises(JournalError, match="to remove its lock does not help"):
+            Journal(tmp_path / "j", "c")
+        lock.unlink()
+        with Journal(tmp_path / "j", "c") as second:
+            with pytest.raises(
+                JournalUnavailableError, match="its lock was removed; end one of them"
+            ) as told:
+                journal.store_model("two")
+            assert second.model == "one"
+            second.store_model("three")
+        journal.store_model("four")
+        assert journal.model == "four"
+    _, fault = str(told.value).split(": ", 1)
+    assert german_journal_fault(f"{tmp_path / 'j'}: {fault}").endswith("einen der beiden beenden")
 
 
 def test_a_second_writer_by_a_symbolic_link_is_refused(tmp_path: Path) -> None:
