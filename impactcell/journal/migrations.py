@@ -12,12 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from impactcell.positioning import (
-    displacement_discrepancy,
-    model_hypotheses,
-    prediction_watch,
-    scatter_hypotheses,
-)
+from impactcell.positioning import displacement_discrepancy, model_hypotheses, scatter_hypotheses
+from impactcell.positioning.prediction_watch import NOTHING_BET
 from impactcell.serialization import Migration
 from impactcell.serialization.tree import Tree
 from impactcell.tracking.wear_batch import block_filter, run_length_bank
@@ -82,7 +78,7 @@ def _planner_2(belief: dict[str, Tree]) -> dict[str, Tree]:
         "scatter_weights": np.tile(scatter, (lacking.size, 1)),
         "taps": belief["taps"],
         "surprise": belief["surprise"],
-        "watch": {"log_sums": np.full(len(prediction_watch.BETS), -np.inf), "score": 0.0, "doubted": False},
+        "watch": {"log_sums": NOTHING_BET, "score": 0.0, "doubted": False},
     }
 
 
@@ -290,9 +286,10 @@ STATE_MIGRATIONS: Final = (
     Migration(added={"handled_target": None}),
     Migration(added={"cell.tracker.clock.earlier": [], "cell.tracker.expects_change": False}),
     Migration(_state_13),
+    Migration(added=_under("planner.watch", {"told_log_sums": NOTHING_BET, "off_taps": 0, "off_score": 0.0})),
 )
-"""Of a cell's state: to formats 2 to 13. What earlier planners had not counted is nothing; how a module
-counted before it last started is not known."""
+"""Of a cell's state: to formats 2 to 14. What earlier planners had not counted is nothing; how a module
+counted before it last started is not known, nor of what they told how much a single tap had said."""
 ALARM_MIGRATIONS: Final = (
     Migration(_alarm_2, renamed=_ALARM_2_RENAMED, added=_ALARM_2_ADDED),
     Migration(_alarm_3),

@@ -8,6 +8,7 @@ from impactcell.positioning.action_selection import ActionSpace, Allowed, Select
 from impactcell.positioning.displacement_quantiles import Scenarios
 from impactcell.positioning.dynamic_programming import nearer
 from impactcell.positioning.lookahead_table import LookaheadTable, PlannerLimits
+from impactcell.positioning.posterior_update import STILL
 
 CAUTION = (1.0, 20.0, 400.0)  # factors on the penalty of an overshoot, tried until a tap is within the bound
 SHARE_OF_A_STEP = 0.2
@@ -16,6 +17,11 @@ WORTH_A_STEP = 0.05
 """Of the remaining distance that such a tap has to come nearer by."""
 LEAST_STEP_M = 1e-6
 """An encoder's resolution: a tap that is to move less is made only where there is no other."""
+
+
+def least_step_m(noise_m: float) -> float:
+    """Return the displacement (m) below which none can be told, measured with this standard deviation."""
+    return max(LEAST_STEP_M, STILL * noise_m)
 
 
 def choose_action(

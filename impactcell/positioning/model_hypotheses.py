@@ -175,10 +175,15 @@ def tap_predictions(posterior: PlannerPosterior) -> TapPredictions:
             std = math.sqrt(float(scatter @ (GRID[:, 2] - size) ** 2))
         evidence = Evidence(statistic=gap, threshold=GAP_EVIDENCE, size=size, size_std=std)
         return TapPredictions(posterior.taps, gap >= GAP_EVIDENCE, depends_on, evidence)
-    off = math.log(posterior.watch.evidence)
-    size = posterior.watch.score * posterior.scatter
-    evidence = Evidence(statistic=off, threshold=math.log(ALARM), size=size, size_std=posterior.scatter)
-    return TapPredictions(posterior.taps, lacking=True, depends_on="", evidence=evidence)
+    watch, std = posterior.watch, posterior.scatter
+    off = math.log(watch.told_evidence)
+    evidence = Evidence(
+        statistic=off,
+        threshold=math.log(ALARM),
+        size=watch.mean_score * std,
+        size_std=std / math.sqrt(max(watch.off_taps, 1)),
+    )
+    return TapPredictions(watch.off_taps, lacking=True, depends_on="", evidence=evidence)
 
 
 def with_model_accepted(posterior: PlannerPosterior) -> PlannerPosterior:

@@ -11,11 +11,12 @@ from impactcell.numerics.raster import ANY_VALUE, Raster
 from impactcell.physics import Plant, free_motion
 from impactcell.positioning import model_hypotheses
 from impactcell.positioning import planner_questions as questions
-from impactcell.positioning.cautious_selection import LEAST_STEP_M, choose_action
+from impactcell.positioning.cautious_selection import choose_action, least_step_m
 from impactcell.positioning.compiling import compile_planning
-from impactcell.positioning.displacement_band import BAND_Z, displacement_band, tap_of
+from impactcell.positioning.displacement_band import displacement_band, tap_of
 from impactcell.positioning.displacement_quantiles import parameter_scenarios
 from impactcell.positioning.friction_along_stroke import StrokeFriction, update_stroke_friction
+from impactcell.positioning.learning import posterior_after
 from impactcell.positioning.lookahead_table import (
     LookaheadTable,
     PlannerLimits,
@@ -23,21 +24,17 @@ from impactcell.positioning.lookahead_table import (
     knowledge_of,
     stiffest,
 )
-from impactcell.positioning.model_hypotheses import tap_predictions, with_model_accepted, with_score
+from impactcell.positioning.model_hypotheses import tap_predictions, with_model_accepted
 from impactcell.positioning.nominal_plant import nominal_plant
 from impactcell.positioning.planner_posterior import PlannerPosterior
-from impactcell.positioning.posterior_update import update_posterior
-from impactcell.positioning.prediction_watch import score_of
+from impactcell.positioning.prediction_watch import POSITION_NOISE_M
 from impactcell.positioning.quadrature import Z
 from impactcell.positioning.safety_limits import PLANNED_SHARE, largest_force, room_m
 from impactcell.positioning.stated_limits import check_sides
 from impactcell.positioning.tap import Tap, Unreachable
-from impactcell.positioning.tap_model import model_of_tap
-from impactcell.positioning.without_tap import overshooting, too_light, unmoved
+from impactcell.positioning.without_tap import MOST_STILL, overshooting, stuck, too_light, unmoved
 from impactcell.records import Quality, Samples, Signature, TapPredictions
 
-MOST_STILL = 10
-"""Taps in a row that move nothing, after which the rest of the way is out of reach."""
 REMEMBERED = 64  # tables, of parts of different mass
 
 
@@ -69,6 +66,9 @@ class TapPlanner:
         Velocities (m/s) and strokes (m) that can be commanded; no other tap is planned.
     travel_m : tuple of float
         Positions between which the part stays, along +1: none is chosen whose 99.9 % band ends beyond.
+    position_noise_m : float
+        Standard deviation with which a displacement is measured: of a sensor with steps half a step, of one
+        whose readings scatter the square root of 2 times what they do.
 
     Raises
     ------
@@ -86,6 +86,7 @@ class TapPlanner:
     velocity_raster: Raster = ANY_VALUE
     stroke_raster: Raster = ANY_VALUE
     travel_m: tuple[float, float] = (-math.inf, math.inf)
+    position_noise_m: float = POSITION_NOISE_M
     _posterior: PlannerPosterior = field(init=False, repr=False)
     _gravity: float = field(init=False, repr=False)
     _lightest_kg: float = field(init=False, repr=False)
@@ -102,6 +103,7 @@ class TapPlanner:
         viscous = max(free_motion.linear_resistance(plant), 0.0)
         self._gravity = plant.gravity_m_s2
         self._lightest_kg = questions.lightest_kg(plant.stiffness_n_per_m, plant.damping_n_s_per_m + viscous)
+        questions.check_sensor(self.position_noise_m)
         compile_planning()
         self._posterior = model_hypotheses.prior(
             plant.stiffness_n_per_m, plant.damping_n_s_per_m, plant.mu_s, plant.mu_k, viscous
@@ -166,10 +168,7 @@ class TapPlanner:
             )
         distance = abs(remaining_m)
         if self._is_stuck(remaining_m):
-            return Unreachable(
-                f"{distance * 1e6:.1f} µm remain, {MOST_STILL} taps in a row have moved nothing, and any "
-                f"that moves more overshoots with a probability above {self.overshoot_probability:.2g}"
-            )
+            return stuck(distance, self.overshoot_probability)
         if mass_kg < self._lightest_kg:
             return too_light(mass_kg, self._lightest_kg)
         part = self._part(mass_kg)
@@ -192,14 +191,10 @@ class TapPlanner:
             is not a number; for a displacement against the tap, or far beyond what taps make, as one in mm.
         """
         questions.check_observation(tap, moved_m, mass_kg, self._posterior.mu_k * self._gravity)
-        self._still = self._still + 1 if abs(moved_m) < LEAST_STEP_M else 0
-        part = self._part(mass_kg)
-        place = np.array([tap.position_m, float(tap.direction)])
-        band = displacement_band(self._posterior, tap.velocity_m_s, np.array([tap.stroke_m]), part, place)[0]
-        if np.isfinite(band).all() and band[BAND_Z.size // 2] > 0.0:
-            self._posterior = with_score(self._posterior, score_of(moved_m, band, BAND_Z))
-        model = model_of_tap(tap, self._posterior, part)
-        self._posterior = update_posterior(self._posterior, model, moved_m)
+        self._still = self._still + 1 if abs(moved_m) < least_step_m(self.position_noise_m) else 0
+        self._posterior = posterior_after(
+            self._posterior, tap, moved_m, self._part(mass_kg), self.position_noise_m
+        )
 
     def observe_friction(self, mu_k: float, std: float, batch_changed: bool = False) -> None:  # noqa: FBT001, FBT002
         """Take over the tracker's kinetic coefficient; `batch_changed`: friction has just stepped.
@@ -279,10 +274,10 @@ class TapPlanner:
 
     def _is_stuck(self, remaining_m: float) -> bool:
         """Whether too many taps in a row have left the part where it lies; who asks again begins anew."""
-        is_same = abs(remaining_m - self._asked_m) < LEAST_STEP_M
-        stuck = is_same and self._still >= MOST_STILL
-        self._asked_m, self._still = remaining_m, 0 if stuck or not is_same else self._still
-        return stuck
+        is_same = abs(remaining_m - self._asked_m) < least_step_m(self.position_noise_m)
+        is_stuck = is_same and self._still >= MOST_STILL
+        self._asked_m, self._still = remaining_m, 0 if is_stuck or not is_same else self._still
+        return is_stuck
 
     def _part(self, mass_kg: float) -> Samples:
         return np.concatenate(

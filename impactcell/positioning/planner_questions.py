@@ -18,6 +18,8 @@ BACK_M = 1e-4
 """By more than that no reading of a part that moved nothing lies behind where it was."""
 LARGEST_FRICTION = 10.0
 """No dry pair of materials comes near."""
+NOISIEST_M = 1e-3
+"""Standard deviation of a displacement beyond which nobody places parts: µm or mm have been given."""
 MOST_DAMPED = 4.0
 """Damping over critical damping of a contact up to which taps are foretold: beyond it a part hardly springs
 back, and the closed form is off by more than a tenth."""
@@ -178,6 +180,20 @@ def check_is_tap(tap: Tap) -> None:
     if not (is_number(tap.position_m) and abs(tap.position_m) <= FURTHEST_M):
         raise PositioningError(
             f"cannot use a tap at the position {shown(tap.position_m)} m: positions are in metres"
+        )
+
+
+def check_sensor(position_noise_m: float) -> None:
+    """Refuse a sensor that no cell has; see `TapPlanner`.
+
+    Raises
+    ------
+    PositioningError
+    """
+    if not (is_positive(position_noise_m) and position_noise_m <= NOISIEST_M):
+        raise PositioningError(
+            f"tap planner: position_noise_m lies between 0 and {NOISIEST_M:g} m, not {position_noise_m}; "
+            "it is in metres"
         )
 
 

@@ -19,7 +19,11 @@ from impactcell.positioning.displacement_discrepancy import (
     BREAKAWAY_SHARE,
     FEATURES,
     HALTING_STD,
-    INDENTATION,
+)
+from impactcell.positioning.mixture_components import (
+    merge_components,
+    split_components,
+    within_most_components,
 )
 from impactcell.positioning.model_hypotheses import (
     join,
@@ -31,25 +35,25 @@ from impactcell.positioning.planner_posterior import (
     BATCH_STD,
     FRICTION,
     PARAMETERS,
-    STIFFNESS,
     PlannerPosterior,
-    with_single_gaussian,
 )
+from impactcell.positioning.prediction_watch import POSITION_NOISE_M
 from impactcell.positioning.scatter_hypotheses import mean_variances, update_weights
 from impactcell.positioning.tap_model import Response, TapModel
 from impactcell.records import Samples
 
 DEGREES = 8.0  # of freedom of the likelihood
-POSITION_NOISE_M = 0.5e-6  # standard deviation of a displacement by an encoder of 1 um: 1 um / sqrt 12, twice
 # Random walk a tap, in units of the parameters: wear of friction, a slow change of the contact, and static
 # friction that ages with the time at rest, by some per cent a decade: what is learned of it does not last.
 WALK = np.concatenate([[1.5e-3, 3e-4, 6e-4, 4e-3, 0.02], np.zeros(FEATURES)])
-NARROW = {FRICTION: 0.05, STIFFNESS: 0.04}  # standard deviations that one Gaussian is trusted with
 NEGLIGIBLE = 1e-4  # weight of a component that is dropped
+STILL = 2.0  # standard deviations of the sensor, within which a part has not moved
 ITERATIONS = 4  # of the linearisation; the last change is below a twentieth of a standard deviation
 CROOKED = 0.1  # of the first regression's remainder that stays, whatever the later ones leave over
-
-
+IMPOSSIBLE = 6.0
+"""Standard deviations by which a Gaussian has to be off to be no explanation of a part that lies still."""
+SURPRISING = 3.0
+"""Standard deviations by which a tap has to be off to be one that was not foretold."""
 LEAST_STD = np.concatenate([np.full(PARAMETERS + 1, 1e-8), [1e-4]])
 """Over which the displacement is made linear at least, in what is regressed; less would be numbers' noise."""
 
@@ -71,11 +75,20 @@ class Step(NamedTuple):
 
 
 def update_posterior(
-    posterior: PlannerPosterior, response: Response | TapModel, moved_m: float
+    posterior: PlannerPosterior,
+    response: Response | TapModel,
+    moved_m: float,
+    noise_m: float = POSITION_NOISE_M,
 ) -> PlannerPosterior:
-    """Posterior after a tap displaced the part by `moved_m`, `response` being the model of that tap."""
+    """Posterior after a tap displaced the part by `moved_m`, `response` being the model of that tap.
+
+    Parameters
+    ----------
+    noise_m : float
+        Standard deviation with which a displacement is measured.
+    """
     model = response if isinstance(response, TapModel) else TapModel(response)
-    updates = [update_hypothesis(part, model, moved_m) for part in parts_of(posterior)]
+    updates = [update_hypothesis(part, model, moved_m, noise_m) for part in parts_of(posterior)]
     parts = [part for part, _ in updates]
     log_evidence = np.array([evidence for _, evidence in updates])
     probabilities = posterior.probabilities
@@ -83,18 +96,22 @@ def update_posterior(
         probabilities = reweighted(probabilities, log_evidence)
     surprise = float(probabilities @ np.array([part.surprise for part in parts]))
     learned = join(parts, probabilities, posterior)
+    slides_easier = learned.mean[FRICTION] < posterior.mean[FRICTION]
+    if is_still(moved_m, noise_m) and abs(surprise) > SURPRISING and slides_easier:
+        parts = [unexplained(part, surprise) for part in parts_of(posterior)]
+        learned = join(parts, posterior.probabilities, posterior)
     learned = replace(learned, taps=posterior.taps + 1, surprise=surprise)
     return with_evidence_of_a_tap(learned, posterior)
 
 
 def update_hypothesis(
-    posterior: PlannerPosterior, model: TapModel, moved_m: float
+    before: PlannerPosterior, model: TapModel, moved_m: float, noise_m: float
 ) -> tuple[PlannerPosterior, float]:
     """Posterior under one hypothesis after a tap, and the logarithm of its density at `moved_m`."""
-    posterior = split_components(posterior)
+    posterior = within_most_components(split_components(before))
     scatter = mean_variances(posterior.scatter_weights[0])
     steps = [
-        update_component(mean, cov + np.diag(WALK**2), scatter, model, moved_m)
+        update_component(mean, cov + np.diag(WALK**2), scatter, model, moved_m, noise_m)
         for mean, cov in zip(posterior.means, posterior.covs, strict=True)
     ]
     with np.errstate(divide="ignore"):
@@ -104,6 +121,9 @@ def update_hypothesis(
     weights = np.exp(logarithm - logarithm.max())
     weights /= weights.sum()
     possible = np.isfinite(logarithm)
+    surprises = np.array([step.surprise for step in steps])
+    if is_still(moved_m, noise_m) and (np.abs(surprises) > IMPOSSIBLE).all():
+        return unexplained(before, float(posterior.weights @ surprises)), -math.inf
     scatter_weights, density = update_weights(
         posterior.scatter_weights[0],
         posterior.weights[possible],
@@ -114,76 +134,45 @@ def update_hypothesis(
     keep = weights > NEGLIGIBLE
     weights = weights[keep] / weights[keep].sum()
     kept = [step for step, k in zip(steps, keep, strict=True) if k]
-    surprise = float(weights @ np.array([step.surprise for step in kept]))
-    covs = np.array([step.cov for step in kept])
-    if abs(surprise) > 3.0 and posterior.surprise * surprise > 6.0:
-        # Two in a row on one side: friction has changed and nobody said so.
-        covs[:, FRICTION, FRICTION] += BATCH_STD**2
+    surprise = float(weights @ surprises[keep])
     learned = replace(
         posterior,
         weights=weights,
         means=np.array([step.mean for step in kept]),
-        covs=covs,
+        covs=np.array([step.cov for step in kept]),
         scatter_weights=scatter_weights[None],
         surprise=surprise,
         hypotheses=np.zeros(len(kept)),
     )
-    return merge_components(learned), density
+    return merge_components(with_step_held_possible(learned, before.surprise)), density
 
 
-def narrow_enough(std: Samples) -> dict[int, float]:
-    """Return the standard deviations that one Gaussian is trusted with.
+def is_still(moved_m: float, noise_m: float) -> bool:
+    """Whether a part has not moved, as far as its displacement is measured."""
+    return abs(moved_m) < STILL * noise_m
 
-    Where the discrepancy leaves the indentation uncertain, a crooked response to stiffness does not matter.
+
+def unexplained(before: PlannerPosterior, surprise: float) -> PlannerPosterior:
+    """Posterior under one hypothesis after a part lay still, though all that it holds possible moves it.
+
+    Which of that is least wrong says nothing: often it is a part that slides more easily, whose way is the
+    least certain.
     """
-    return {**NARROW, STIFFNESS: max(NARROW[STIFFNESS], float(std[PARAMETERS + INDENTATION]))}
+    return with_step_held_possible(replace(before, surprise=surprise), before.surprise)
 
 
-def split_components(posterior: PlannerPosterior) -> PlannerPosterior:
-    """Sum of Gaussians, each narrow in friction, then in stiffness, with the posterior's mean and spread.
-
-    Of one hypothesis, as `merge_components`.
-    """
-    weights, means, covs = [], [], []
-    for weight, mean, cov in zip(posterior.weights, posterior.means, posterior.covs, strict=True):
-        std = np.sqrt(np.diag(cov))
-        widths = narrow_enough(std)
-        wide = next((axis for axis, narrow in widths.items() if std[axis] > 1.5 * narrow), None)
-        if wide is None:
-            weights.append(weight)
-            means.append(mean)
-            covs.append(cov)
-            continue
-        ratio = std[wide] / widths[wide]
-        nodes = np.linspace(-2.6, 2.6, 2 * math.ceil(1.3 * ratio) + 1)
-        shares = np.exp(-0.5 * nodes**2)
-        shares /= shares.sum()
-        regression = cov[wide] / std[wide]
-        left = cov - np.outer(regression, regression) * min(float(shares @ nodes**2), 1.0 - ratio**-2)
-        for node, share in zip(nodes, shares, strict=True):
-            weights.append(weight * share)
-            means.append(mean + regression * node)
-            covs.append(left)
-    return replace(
-        posterior,
-        weights=np.array(weights),
-        means=np.array(means),
-        covs=np.array(covs),
-        hypotheses=np.zeros(len(weights)),
-    )
-
-
-def merge_components(posterior: PlannerPosterior) -> PlannerPosterior:
-    """One Gaussian, as soon as together they are narrow enough for one to be trusted."""
-    if posterior.weights.size == 1:
+def with_step_held_possible(posterior: PlannerPosterior, surprise_before: float) -> PlannerPosterior:
+    """Posterior that holds a change of friction possible that nobody announced: two in a row on one side."""
+    if not (abs(posterior.surprise) > SURPRISING and surprise_before * posterior.surprise > 6.0):
         return posterior
-    std = np.sqrt(np.diag(posterior.cov))
-    if any(std[axis] > 1.3 * narrow for axis, narrow in narrow_enough(std).items()):
-        return posterior
-    return with_single_gaussian(posterior, posterior.mean, posterior.cov)
+    covs = posterior.covs.copy()
+    covs[:, FRICTION, FRICTION] += BATCH_STD**2
+    return replace(posterior, covs=covs)
 
 
-def update_component(mean: Samples, cov: Samples, scatter: Samples, model: TapModel, moved_m: float) -> Step:
+def update_component(
+    mean: Samples, cov: Samples, scatter: Samples, model: TapModel, moved_m: float, noise_m: float
+) -> Step:
     """One Gaussian after one displacement; `scatter` has the expected squares of the three of it.
 
     What is regressed are the parameters, the tap's friction factor and psi · w; the slope over phi · w, which
@@ -199,7 +188,7 @@ def update_component(mean: Samples, cov: Samples, scatter: Samples, model: TapMo
     prior[:size, :size] = cov
     prior[size, size] = scatter[0]
     floor = np.diag(LEAST_STD**2)
-    unmodelled = POSITION_NOISE_M**2 + (HALTING_STD * model.halting_m) ** 2
+    unmodelled = noise_m**2 + (HALTING_STD * model.halting_m) ** 2
     point, after = before.copy(), prior
     weight, surprise, likelihood, crooked = 1.0, 0.0, -math.inf, 0.0
     foretold, rest, reaches = 0.0, 1.0, np.zeros(3)
@@ -246,7 +235,7 @@ def update_component(mean: Samples, cov: Samples, scatter: Samples, model: TapMo
         likelihood,
         surprise,
         foretold,
-        max(rest, POSITION_NOISE_M**2),
+        max(rest, noise_m**2),
         reaches,
     )
 

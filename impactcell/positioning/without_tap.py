@@ -11,12 +11,23 @@ from impactcell.positioning.planner_posterior import PlannerPosterior
 from impactcell.positioning.tap import Unreachable
 from impactcell.records import Samples
 
+MOST_STILL = 10
+"""Taps in a row that move nothing, after which the rest of the way is out of reach."""
+
 
 def too_light(mass_kg: float, lightest_kg: float) -> Unreachable:
     """Of a part whose contact is damped beyond what taps are foretold for."""
     return Unreachable(
         f"a part of {mass_kg:g} kg is too light to plan for: below {lightest_kg:.2g} kg the damping of the "
         "contact keeps it from springing back"
+    )
+
+
+def stuck(distance_m: float, overshoot_probability: float) -> Unreachable:
+    """Of a part that too many taps in a row have left where it lies."""
+    return Unreachable(
+        f"{distance_m * 1e6:.1f} µm remain, {MOST_STILL} taps in a row have moved nothing, and any "
+        f"that moves more overshoots with a probability above {overshoot_probability:.2g}"
     )
 
 

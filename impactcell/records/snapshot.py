@@ -13,7 +13,7 @@ class TapPredictions:
     Attributes
     ----------
     taps : int
-        Learned from.
+        Learned from; of displacements that are off without a pattern, those over which they have been.
     lacking : bool
         The model lacks something, beyond chance.
     depends_on : str

@@ -15,6 +15,7 @@ from impactcell.fieldbus.positioning_registers import commanded_values
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.journal.retention import Retention
 from impactcell.positioning import SafetyLimits, TapPlanner, task_state_machine
+from impactcell.positioning.prediction_watch import POSITION_NOISE_M
 from impactcell.records import MM_PER_MIN
 from impactcell.scada import (
     CellDescription,
@@ -234,6 +235,7 @@ def tap_planner(
             velocity_raster=commanded_values(registers, "command_velocity"),
             stroke_raster=commanded_values(registers, "command_stroke"),
             travel_m=limits.travel_m,
+            position_noise_m=max(0.5 * limited.resolution_m, POSITION_NOISE_M),
         )
     except PositioningError as refused:
         raise PositioningError(f"{cell.path}: {refused}") from refused

@@ -10,8 +10,8 @@ from impactcell.errors import PositioningError
 from impactcell.numerics.raster import Raster
 from impactcell.physics import Plant
 from impactcell.positioning import Tap, TapPlanner, Unreachable
-from impactcell.positioning.planner import MOST_STILL
 from impactcell.positioning.planner_posterior import PARAMETERS
+from impactcell.positioning.without_tap import MOST_STILL
 from simulator.plant_nominal import nominal_taps
 
 ALONG = 3

@@ -8,6 +8,10 @@ import pytest
 
 from impactcell.physics.closed_form import displacement_of
 from impactcell.positioning.displacement_quantiles import plant_parameters
+from impactcell.positioning.mixture_components import (
+    merge_components,
+    split_components,
+)
 from impactcell.positioning.model_hypotheses import condition_on_friction, parts_of, prior
 from impactcell.positioning.planner_posterior import (
     PlannerPosterior,
@@ -15,7 +19,7 @@ from impactcell.positioning.planner_posterior import (
     prior_of_plant,
     with_single_gaussian,
 )
-from impactcell.positioning.posterior_update import merge_components, split_components, update_posterior
+from impactcell.positioning.posterior_update import update_posterior
 from simulator.plant_nominal import nominal_taps
 
 START = prior(6.5e5, 465.0, 0.2, 0.152, 0.0)
