@@ -13,10 +13,12 @@ from impactcell.discrepancy.machine import NumberPrior, channel_values, investig
 from impactcell.discrepancy.machine import finding as machine_finding
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
 from impactcell.discrepancy.machine.finding import Remainder
+from impactcell.discrepancy.machine.record_notes import notes_of_records
 from impactcell.discrepancy.machine.regression import blocks_of
 from impactcell.discrepancy.machine.remainder import remainder_of
 from impactcell.discrepancy.machine.rival_forms import hats
 from impactcell.discrepancy.machine.trials import TermSearch
+from impactcell.discrepancy.machine.uniform_records import uniform_records
 from impactcell.discrepancy.machine.weak_form import Rows
 from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
 from impactcell.errors import CampaignError
@@ -105,8 +107,20 @@ def test_a_spike_is_replaced_by_the_line_between_its_neighbours() -> None:
     spoilt[[0, 150, 151, 400]] += [30.0, 30.0, 28.0, -25.0]
     clean, spikes = channel_values.without_spikes(spoilt)
     assert spikes == 4
-    assert clean[1:] == pytest.approx(values[1:], abs=1e-12)
-    assert clean[0] == values[1]
+    assert clean == pytest.approx(values, abs=1e-12)
+
+
+@pytest.mark.parametrize(("drive", "samples"), [(0.0, 600), (1.0, 1200)])
+def test_spikes_are_told_of_the_samples_that_there_are(drive: float, samples: int) -> None:
+    """A part without a drive has no force that was looked through."""
+    time = np.linspace(0.0, 6.0, 600)
+    spoilt = np.sin(time)
+    spoilt[200] += 3.0
+    force = Channel(time, drive * np.cos(time) + np.random.default_rng(2).normal(0.0, 1e-3, 600))
+    shot = Capture(1, math.nan, 1.0, force if drive else None, Channel(time, spoilt))
+    base = BaseModel(inertia=NumberPrior(1.0))
+    records = uniform_records(Campaign(Excitation.DRIVEN, (shot,)), base)
+    assert notes_of_records(base, records)[0].startswith(f"1 of {samples} samples stood far")
 
 
 def test_a_push_of_some_samples_is_no_spike() -> None:

@@ -1,7 +1,8 @@
 """Values of a channel made fit for a regression: spikes are replaced, and a held force is averaged."""
 
 import numpy as np
-from scipy.ndimage import binary_opening, median_filter
+from numpy.typing import NDArray
+from scipy.ndimage import binary_opening, median_filter, percentile_filter
 
 from impactcell.records import Samples
 
@@ -12,7 +13,12 @@ SPIKE_WINDOW = 9
 SPIKE_FACTOR = 8.0
 """A spike differs from the running median this many times more than 95 % of the samples do [1]."""
 MIN_SPIKE_SHARE = 0.05
-"""And by at least this share of the channel's range [1]."""
+"""And by at least this share of the running median's range [1]."""
+NEARBY = 51
+"""Samples about a spike, three quarters of which tell how rough it is there: a force rings and rests."""
+CONTINUED_BY, MIN_OFF_SHARE = 4, 0.5
+"""Sound samples nearest to a spike that are continued to it, and the share of its distance from the running
+median by which it is off that: a motion with seven samples in a period is off by less [1]."""
 MAX_SPIKE_SAMPLES = 2
 """Samples in a row that are a spike, as where data are inspected: the pushes of a controller last longer."""
 USUAL_SHARE, USUAL_NOISES = 0.9, 1.645
@@ -36,22 +42,46 @@ def held_mean(times: Samples, values: Samples, begin: Samples, end: Samples) -> 
 
 def cleaned_position(position: Samples) -> tuple[Samples, int]:
     """Replace spikes and outliers of a position; how many were replaced beside it."""
-    values, spikes = without_spikes(position)
-    values, outliers = without_outliers(values)
-    return values, spikes + outliers
+    values, outliers = without_outliers(position)
+    values, spikes = without_spikes(values)
+    return values, outliers + spikes
 
 
 def without_spikes(values: Samples) -> tuple[Samples, int]:
-    """Replace one or two samples far from the running median by the line between their neighbours."""
-    middle = median_filter(values, SPIKE_WINDOW, mode="mirror")
+    """Replace one or two samples far from the running median, and from what their neighbours continue to."""
+    if len(values) < SPIKE_WINDOW:
+        return values, 0
+    reach = SPIKE_WINDOW // 2
+    middle = median_filter(_extended(values, reach), SPIKE_WINDOW)[reach:-reach]
     distance = np.abs(values - middle)
     usual = float(np.quantile(distance, 0.95))
-    span = float(np.subtract(*np.quantile(values, [LARGEST, 1.0 - LARGEST])))
-    far = distance > max(SPIKE_FACTOR * usual, MIN_SPIKE_SHARE * span, np.finfo(float).tiny)
+    least = max(SPIKE_FACTOR * usual, MIN_SPIKE_SHARE * float(np.ptp(middle)), np.finfo(float).tiny)
+    far = distance > least
     # What stays away for longer is a motion or a push: a structure wider than a spike opens none of it.
-    spikes = far & ~binary_opening(far, np.ones(MAX_SPIKE_SAMPLES + 1, dtype=bool))
-    place = np.arange(len(values))
-    return np.interp(place, place[~spikes], values[~spikes]), int(spikes.sum())
+    apart = far & ~binary_opening(far, np.ones(MAX_SPIKE_SAMPLES + 1, dtype=bool))
+    rough = SPIKE_FACTOR * percentile_filter(np.abs(_roughness(values)), 75.0, NEARBY, mode="mirror")
+    replaced, sound = values.copy(), np.flatnonzero(~apart)
+    for place in np.flatnonzero(apart):
+        near = sound[np.argsort(np.abs(sound - place), kind="stable")[:CONTINUED_BY]]
+        continued, closely = (np.polyfit(near - place, values[near], degree)[-1] for degree in (2, 3))
+        share = MIN_OFF_SHARE * distance[place]
+        is_off = abs(values[place] - continued) > max(share, least, rough[place])
+        if is_off and abs(values[place] - closely) > share:
+            replaced[place] = continued
+    return replaced, int(np.count_nonzero(replaced != values))
+
+
+def _extended(values: Samples, reach: int) -> Samples:
+    """Continue values at both ends by lines through those near them, which no faulty one or two turn."""
+
+    def beyond(near: Samples) -> Samples:
+        slope = np.median(np.diff(near))
+        level = np.median(near - slope * np.arange(len(near)))
+        line: Samples = level - slope * np.arange(reach, 0, -1)
+        return line
+
+    begin, end = beyond(values[:SPIKE_WINDOW]), beyond(values[: -SPIKE_WINDOW - 1 : -1])[::-1]
+    return np.concatenate([begin, values, end])
 
 
 def without_outliers(position: Samples) -> tuple[Samples, int]:
@@ -72,14 +102,21 @@ def without_outliers(position: Samples) -> tuple[Samples, int]:
         rough = np.abs(_roughness(near))
         if rough[place - first] <= SPIKE_FACTOR * usual:
             continue
-        for other in (0, 1, -1, 2, -2, 3, -3):
-            faulty = np.unique(np.clip([place - first, place - first + other], 0, len(near) - 1))
-            filled = _filled(near, faulty)
+        for faulty in _may_be_faulty(place, len(values)):
+            filled = _filled(near, faulty - first)
             if np.abs(_roughness(filled)).max() <= KINK_LEFT * rough.max():
                 values[first : place + ABOUT + 1] = filled
                 replaced += len(faulty)
                 break
     return values, replaced
+
+
+def _may_be_faulty(place: int, size: int) -> list[NDArray[np.int64]]:
+    """Give samples, one or two, that make one rough: of the ends, whose roughness is not known, but one."""
+    others = [place + shift for shift in (1, -1, 2, -2, 3, -3)]
+    ends = [[other] for other in others if not 2 <= other < size - 2 and abs(other - place) <= 2]
+    pairs = [sorted((place, other)) for other in others if 2 <= other < size - 2]
+    return [np.array(faulty) for faulty in [*ends, [place], *pairs]]
 
 
 def _filled(values: Samples, faulty: np.ndarray) -> Samples:

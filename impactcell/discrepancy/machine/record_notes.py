@@ -19,7 +19,7 @@ def notes_of_records(base: BaseModel, records: Sequence[UniformRecord]) -> list[
     notes = []
     spikes = sum(record.spikes for record in records)
     if spikes:
-        samples = sum(2 * len(record.position) for record in records)
+        samples = sum((2 if record.force.any() else 1) * len(record.position) for record in records)
         notes.append(f"{spikes} of {samples} samples stood far from their neighbours and were replaced.")
     commands = sum(record.force_is_command for record in records)
     if commands:
