@@ -88,7 +88,7 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     if (position := mapping.of(ColumnMeaning.POSITION)) is not None and position.summed_up:
         captures = [_with_summed_position(capture) for capture in captures]
     if all(math.isnan(capture.mass_kg) for capture in captures):
-        notes.append(_without_mass(coordinate, tables))
+        notes.append(_without_mass(coordinate, excitation, tables))
     if excitation is Excitation.TAP and "stroke" not in given.constants:
         notes.append(
             "no stroke is stated: the actuator is taken to halt as it loses contact; give --set stroke=1.5mm"
@@ -137,14 +137,17 @@ def _of_copies(records: Sequence[Record]) -> list[str]:
     ]
 
 
-def _without_mass(coordinate: Coordinate, tables: Sequence[Table]) -> str:
+def _without_mass(coordinate: Coordinate, excitation: Excitation, tables: Sequence[Table]) -> str:
     if coordinate is Coordinate.ROTATION:
         return (
             "no inertia is stated: the base model has to say it (inertia_kg_m2); "
             'give --set "mass=0.02 kg m²" where it is not one for all'
         )
     stated = "stated in its unit" if has_unread_mass(tables) else "stated"
-    return f"no mass is {stated}: it is fitted, and only friction over mass is seen; give --set mass=18.9kg"
+    way = "give --set mass=18.9kg"
+    if excitation is Excitation.DRIVEN:
+        return f"no mass is {stated}: a base model has to say it (mass_kg), else it is fitted; {way}"
+    return f"no mass is {stated}: it is fitted, and only friction over mass is seen; {way}"
 
 
 def _of_taps_only(given: Given, excitation: Excitation) -> list[str]:

@@ -83,7 +83,11 @@ def lacking(
     told: AbstractSet[ColumnMeaning] = frozenset(),
 ) -> list[str]:
     """Say what has to be given first; nothing of the quantities whose lack has been `told` already."""
-    faults = [fault for item in assignments for fault in _of_column(item, _written_unit(item, tables))]
+    faults = [
+        fault
+        for item in assignments
+        for fault in _of_column(item, _written_unit(item, tables), turns=rotates(item, assignments))
+    ]
     faults += _contradictions(assignments)
     present = {*told, *(item.meaning for item in assignments)}
     if ColumnMeaning.TIME not in present and any(
@@ -118,12 +122,24 @@ def _written_unit(item: Assignment, tables: Sequence[Table]) -> str:
     return next((column.unit or "" for column in columns if column is not None), "")
 
 
-def _of_column(item: Assignment, written: str) -> list[str]:
+def rotates(item: Assignment, assignments: Sequence[Assignment]) -> bool:
+    """Whether a channel is of what turns: by the units of all of them, else by how any is called."""
+    if item.meaning not in CHANNELS:
+        return False
+    channels = [one for one in assignments if one.meaning in CHANNELS]
+    for one in channels:
+        dimensions = VOCABULARY[one.meaning].dimensions
+        if one.unit is not None and one.unit.dimension in dimensions:
+            return one.unit.dimension is not dimensions[0]
+    return any(name_score(one.column, one.meaning)[1] in ROTATION_WORDS for one in channels)
+
+
+def _of_column(item: Assignment, written: str, *, turns: bool) -> list[str]:
     if item.meaning in UNITLESS:
         return []
     faults = []
     if item.unit is None:
-        faults.append(no_unit(item, written))
+        faults.append(no_unit(item, written, turns=turns))
     elif item.unit.dimension not in VOCABULARY[item.meaning].dimensions and not item.summed_up:
         faults.append(
             f"column {item.column!r} ({item.meaning}) is in {item.unit.symbol}; "
@@ -137,10 +153,9 @@ def _of_column(item: Assignment, written: str) -> list[str]:
     return faults
 
 
-def no_unit(item: Assignment, written: str) -> str:
+def no_unit(item: Assignment, written: str, *, turns: bool) -> str:
     """Say that a column has no unit, or has `written` one that is not known, and which it may be."""
-    rotates = name_score(item.column, item.meaning)[1] in ROTATION_WORDS
-    unit = VOCABULARY[item.meaning].dimensions[1 if rotates else 0].value
+    unit = VOCABULARY[item.meaning].dimensions[1 if turns else 0].value
     lack = f"is in {written!r}, no unit that is known" if written else "has no unit"
     return (
         f"column {item.column!r} ({item.meaning}) {lack}; say --unit '{item.column}={unit}', or which it is"
@@ -212,9 +227,11 @@ def _no_time(tables: Sequence[Table], named: AbstractSet[str], unused: AbstractS
             if column.name not in unused or column.text is not None or not ascends(column.values):
                 continue
             step = float(np.median(np.diff(column.values)))
-            if step != round(step):
+            if step != round(step) or step > 1.0:
+                unit = "s" if step < 1.0 else "ms"
                 return (
-                    f": {column.name!r} goes up by {step:.6g} a row and may be it, in a unit to be said{way}"
+                    f": {column.name!r} goes up by {step:.6g} a row and may be it, in a unit to be said, as "
+                    f"--unit '{column.name}={unit}'{way}"
                 )
     return way
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from impactcell.measurements.assignment import UNITLESS, Assignment, no_unit
+from impactcell.measurements.assignment import UNITLESS, Assignment, no_unit, rotates
 from impactcell.measurements.gains import Gain
 from impactcell.measurements.recognition import ColumnMeaning
 from impactcell.measurements.table import MeasuredColumn, Table
@@ -39,7 +39,8 @@ def without_unit(
             if item.unit is None or item.meaning in UNITLESS:
                 continue
             if measured_unit(unit_of(column, units), item.meaning, gains) is None:
-                faults.setdefault(column.name, f"{table.title}: {no_unit(item, column.unit or '')}")
+                lack = no_unit(item, column.unit or "", turns=rotates(item, assignments))
+                faults.setdefault(column.name, f"{table.title}: {lack}")
     return list(faults.values())
 
 

@@ -71,7 +71,8 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
 
 def _lines(text: str, source: str, limits: Limits) -> list[str]:
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    while lines and not lines[-1].strip(" \t\x1a"):
+    nothing = " \t\x1a" + "".join(DELIMITERS)  # a spreadsheet saves rows of no more below a table
+    while lines and not lines[-1].strip(nothing):
         lines.pop()
     if not lines:
         raise MeasurementError(f"{source}: is empty; leave the file out, or record it again")

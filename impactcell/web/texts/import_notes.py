@@ -89,6 +89,11 @@ GERMAN: Final = {
         r"die Zeile „\2“ sagt \3, keine passende Einheit, und zählt nicht, in \4 Dateien, zuerst in \5",
     r"no mass is stated: it is fitted, and only friction over mass is seen":
         "keine Masse angegeben: sie wird angepasst, zu sehen ist nur Reibung durch Masse",
+    r"no mass is stated: a base model has to say it \(mass_kg\), else it is fitted":
+        "keine Masse angegeben: ein Grundmodell muss sie nennen (mass_kg), sonst wird sie angepasst",
+    r"no mass is stated in its unit: a base model has to say it \(mass_kg\), else it is fitted":
+        "keine Masse mit ihrer Einheit angegeben: ein Grundmodell muss sie nennen (mass_kg), sonst wird sie "
+        "angepasst",
     r"no inertia is stated: the base model has to say it \(inertia_kg_m2\)":
         "keine Trägheit angegeben: das Grundmodell muss sie nennen (inertia_kg_m2)",
     r"no mass is stated in (\d+) of (\d+) records, the first (.+): it is left empty there":

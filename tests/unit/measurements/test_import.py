@@ -201,6 +201,18 @@ WAVE = np.sin(40.0 * TIME)
             {"a": (None, TIME), "n": (None, 1e3 * TIME), "F": ("N", WAVE), "x": ("m", WAVE)},
             "no column of time was found: 'a' goes up by 0.001 a row and may be it, in a unit to be said",
         ),
+        (
+            {"n": (None, np.arange(0.0, 2000.0, 10.0)), "F": ("N", WAVE), "x": ("m", WAVE)},
+            "'n' goes up by 10 a row and may be it, in a unit to be said, as --unit 'n=ms'; name it",
+        ),
+        (
+            {"t": ("s", TIME), "torque": (None, WAVE), "position": ("m", WAVE)},
+            "column 'torque' (force) has no unit; say --unit 'torque=N', or which it is",
+        ),
+        (
+            {"t": ("s", TIME), "torque": (None, WAVE), "position": (None, WAVE)},
+            "column 'position' (position) has no unit; say --unit 'position=rad', or which it is",
+        ),
         ({"n": (None, np.round(1e3 * TIME)), "F": ("N", WAVE)}, "no column of time was found; name it"),
         ({"t": ("s", TIME), "u": ("V", WAVE)}, "neither position nor force was found among 't', 'u'"),
         ({"t": ("s", TIME), "a": ("m", WAVE), "b": ("m", WAVE)}, "may be the position"),
@@ -228,7 +240,11 @@ def test_what_is_given_goes_before_what_is_guessed() -> None:
     assert (force.column, force.confidence) == ("Fx", 1.0)
     assert position.unit is not None
     assert position.unit.factor == 1e-6
-    assert make_campaign(tables, mapping).campaign.excitation is Excitation.DRIVEN
+    made = make_campaign(tables, mapping)
+    assert made.campaign.excitation is Excitation.DRIVEN
+    [note] = [note for note in made.notes if note.startswith("no mass is stated")]
+    assert "a base model has to say it (mass_kg)" in note
+    assert page_note(note, "de")[0] == "de"
 
 
 @pytest.mark.slow

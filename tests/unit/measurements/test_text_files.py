@@ -114,6 +114,16 @@ def test_lines_of_rows_and_what_is_beside_them(tmp_path: Path) -> None:
     assert "header in line 4, units in line 5, numbers from line 6" in table.notes
 
 
+@pytest.mark.parametrize("below", [",\n", ", \t\n", ";;\n", "\n"])
+def test_rows_without_a_cell_below_a_table_are_no_rows(below: str, tmp_path: Path) -> None:
+    """A spreadsheet saves as many as its sheet once had."""
+    path = tmp_path / "a.csv"
+    path.write_text(rows(40, "{0}.5,{1}.25") + 16_600 * below, encoding="utf-8")
+    table = one(path)
+    assert [len(column.values) for column in table.columns] == [40, 40]
+    assert table.columns[1].values[-1] == 79.25
+
+
 def test_dates_and_clock_times_become_seconds(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text(
