@@ -5,7 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from impactcell.german.open_loop import german_open_loop_sentence
+from impactcell.german.open_loop import german_better_sentence, german_open_loop_sentence
 from impactcell.numerics.compilation import COMPILING
 from impactcell.physics.effect import German
 from impactcell.physics.effect_names import in_words
@@ -194,7 +194,11 @@ def _follows(simulation: Mapping[str, Any] | None) -> str:
     said = german_open_loop_sentence(
         GERMAN_QUANTITIES.get(channel, channel), math.nan if fit is None else fit
     )
-    return f" {said}" if said else ""
+    if better := simulation.get("better_with"):
+        rmse = simulation["rmse"]["after"], better["rmse"]
+        names = enumerated([*map(german_effect, better["effects"])], "oder")
+        said = f"{german_better_sentence(names, rmse, simulation['unit'])} {said}"
+    return f" {said}".rstrip()
 
 
 def _outdone(result: Mapping[str, Any]) -> str:

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
-from impactcell.discrepancy.machine import NumberPrior, channel_values, investigation, proof, simulation
+from impactcell.discrepancy.machine import (
+    NumberPrior,
+    OpenLoopError,
+    channel_values,
+    investigation,
+    proof,
+    simulation,
+)
 from impactcell.discrepancy.machine import finding as machine_finding
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
 from impactcell.discrepancy.machine.finding import Remainder
@@ -216,7 +223,7 @@ def test_a_simulation_that_errs_more_with_a_named_term_is_told(
 ) -> None:
     base = BaseModel(response=Response.POSITION, coordinate=Coordinate.TRANSLATION)
     found: Any = SimpleNamespace(established=established, base=base)
-    errors: Any = tuple(machine_finding.OpenLoopError(error, 50.0, math.nan) for error in rmse)
+    errors: Any = tuple(OpenLoopError(error, 50.0, math.nan) for error in rmse)
     notes = notes_of_simulation(found, errors)
     assert len(notes) == said
     assert all("0.013 m off with it, 0.008 without" in note for note in notes)

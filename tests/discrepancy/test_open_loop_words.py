@@ -14,6 +14,7 @@ from impactcell.campaign import Campaign, Coordinate, Excitation, write
 from impactcell.cli.estimate import estimate
 from impactcell.discrepancy.data import prepare
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, investigate_machine
+from impactcell.discrepancy.machine.record_checks import check_blocks
 from impactcell.discrepancy.report import sentences
 from impactcell.errors import CampaignError
 from impactcell.german.findings import german_headline
@@ -49,7 +50,8 @@ def test_logs_that_are_not_of_one_machine_are_asked_after(tmp_path: Path) -> Non
     result = json.loads((tmp_path / "found" / "result.json").read_text(encoding="utf-8"))
     assert result["headline"].endswith(
         f"does not follow the held-out position: it errs {times} times as much as a constant. "
-        "See whether all records are of one machine in one state."
+        "See whether all records are of one machine in one state, or whether the model lacks something, as "
+        "its damping."
     )
     pages = [
         (tmp_path / "found" / name).read_text(encoding="utf-8") for name in ("report.html", "report.de.html")
@@ -82,6 +84,15 @@ def test_taps_are_told_the_same_way(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_records_too_short_to_hold_anything_out_are_refused(rates: list[float], lasting_s: float) -> None:
     with pytest.raises(CampaignError, match=r"too short .*--test.* `block_s`"):
         investigate_machine(swings(rates, lasting_s), PENDULUM)
+
+
+def test_records_too_short_for_thirds_are_refused_before_any_work() -> None:
+    """No third of a record is a block where it has no more than two."""
+    refused: Any = SimpleNamespace(
+        held=None, block_s=499.0, records=[SimpleNamespace(time_s=np.arange(0.0, 600.0))]
+    )
+    with pytest.raises(CampaignError, match=r"too short for blocks of 499 s, .*--test.* `block_s`"):
+        check_blocks(refused)
 
 
 def test_what_turns_is_asked_for_a_base_model() -> None:

@@ -6,13 +6,13 @@ from impactcell.discrepancy.machine.finding import (
     FittedModel,
     MachineFinding,
     MachineLaw,
-    OpenLoopError,
 )
 from impactcell.discrepancy.machine.held_out_stretch import drifts
 from impactcell.discrepancy.machine.investigation import investigate_machine
 from impactcell.discrepancy.machine.law_terms import LAW_PLACES, term_of
 from impactcell.discrepancy.machine.model_forces import motions
 from impactcell.discrepancy.machine.needs import MIN_NEED
+from impactcell.discrepancy.machine.open_loop_error import OpenLoopError
 from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, VALUES
 from impactcell.discrepancy.machine.selection import SelectionStep
 from impactcell.discrepancy.machine.simulation import simulate_held_out

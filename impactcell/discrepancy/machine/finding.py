@@ -8,6 +8,7 @@ from impactcell.discrepancy.laws import FittedFunction
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
 from impactcell.discrepancy.machine.law_terms import listed_term
 from impactcell.discrepancy.machine.motion_scale import MotionScale
+from impactcell.discrepancy.machine.open_loop_error import BetterSimulation, OpenLoopError
 from impactcell.discrepancy.machine.regression import Blocks, LinearFit
 from impactcell.discrepancy.machine.selection import SelectionStep
 from impactcell.discrepancy.machine.trials import ChosenTerm
@@ -110,25 +111,6 @@ class Remainder:
     constant_share: float
 
 
-@dataclass(frozen=True, slots=True)
-class OpenLoopError:
-    """Error of a simulation over all held-out stretches.
-
-    Attributes
-    ----------
-    rmse : float
-        [m, rad, N or N m].
-    fit_percent : float
-        100 (1 - rmse / standard deviation of what was measured), of a position about each stretch's own mean.
-    relative_force : float
-        rmse over the RMS of the measured force; nan where the position is predicted.
-    """
-
-    rmse: float
-    fit_percent: float
-    relative_force: float
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class MachineLaw:
     """A function that the catalogue does not have, where something remains.
@@ -216,6 +198,8 @@ class MachineFinding:
         Records that would tell tied terms apart.
     simulated : tuple of OpenLoopError
         Of the held-out simulation, by the nominal and by the final model; empty until it was done.
+    better_simulated : BetterSimulation or None
+        Where nothing is established, a term that held-out blocks do not show and their simulation does.
     """
 
     base: BaseModel
@@ -241,6 +225,7 @@ class MachineFinding:
     law_refused: str = ""
     experiments: tuple[Proposal, ...] = ()
     simulated: tuple[OpenLoopError, ...] = ()
+    better_simulated: BetterSimulation | None = None
 
     @staticmethod
     def enough(training: Blocks, held_out: Blocks) -> bool:
@@ -272,10 +257,19 @@ class MachineFinding:
     @property
     def noise_hides(self) -> bool:
         """Whether the equation of motion shows nothing beyond noise, and a simulation errs far beyond."""
-        if not self.simulated or self.base.response is Response.FORCE or not self.is_at_floor:
+        if self.better_simulated is not None and self.fall.after <= self.expected[1]:
+            return True
+        return (
+            self.errs_beyond_noise and self.is_at_floor and self.simulated[-1].fit_percent < POOR_FIT_PERCENT
+        )
+
+    @property
+    def errs_beyond_noise(self) -> bool:
+        """Whether simulated positions are off by more than the sensor's noise makes them."""
+        if not self.simulated or self.base.response is Response.FORCE:
             return False
-        error, noise = self.simulated[-1], max(record.position_noise for record in self.records)
-        return error.fit_percent < POOR_FIT_PERCENT and error.rmse > FAR_ABOVE_NOISE * noise
+        noise = max(record.position_noise for record in self.records)
+        return self.simulated[-1].rmse > FAR_ABOVE_NOISE * noise
 
     @property
     def tied_with(self) -> dict[str, tuple[str, ...]]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
+from impactcell.discrepancy.machine.closing_notes import with_closing_notes
 from impactcell.discrepancy.machine.column_slips import slip_in_columns, told_of_slip, with_degrees_asked_for
 from impactcell.discrepancy.machine.establishing import establish
 from impactcell.discrepancy.machine.experiment_design import with_experiments
@@ -88,7 +89,8 @@ def investigate_machine(
     slip = slip_in_columns(fits, finding)
     if slip is not None:
         return told_of_slip(fits, finding, slip, notes)
-    return with_experiments(fits, with_degrees_asked_for(with_law(fits, finding)))
+    finding = with_experiments(fits, with_degrees_asked_for(with_law(fits, finding)))
+    return with_closing_notes(fits, finding)
 
 
 def _established(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:

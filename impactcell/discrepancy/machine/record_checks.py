@@ -9,6 +9,8 @@ from impactcell.errors import CampaignError
 
 LONGEST_DELAY = 0.25
 """Share of a record up to which a delay may be stated: no force goes with so much of it. Our choice."""
+LEAST_FOR_THIRDS = 2.0
+"""Blocks in the longest record up to which no third of any can be a block."""
 
 
 def check_delay(base: BaseModel, records: Sequence[UniformRecord]) -> None:
@@ -55,6 +57,10 @@ def check_blocks(fits: MachineFits) -> None:
     CampaignError
         There is not.
     """
+    thirds = fits.held is None
+    longest_s = max(float(record.time_s[-1]) for record in fits.records)
+    if thirds and longest_s < LEAST_FOR_THIRDS * fits.block_s:
+        raise _too_short(fits)
     if not fits.rows().target.size:
         raise CampaignError(
             "nowhere does the part move faster than the noise of its position shows: record a larger or "
@@ -63,7 +69,7 @@ def check_blocks(fits: MachineFits) -> None:
     training, held_out = fits.blocks()
     if len(training) and len(held_out):
         return
-    thirds, used = fits.held is None, "held out" if len(training) else "fitted"
+    used = "held out" if len(training) else "fitted"
     records = [
         record
         for place, record in enumerate(fits.records)
@@ -79,7 +85,13 @@ def check_blocks(fits: MachineFits) -> None:
             f"what is {used} ({which}) moves too little{or_gaps} for a block of {fits.block_s:.3g} s: hold "
             f"{'whole' if thirds else 'other'} records out (--test), or record a larger or faster motion"
         )
-    raise CampaignError(
+    raise _too_short(fits)
+
+
+def _too_short(fits: MachineFits) -> CampaignError:
+    """Say that records are too short for blocks."""
+    thirds = fits.held is None
+    return CampaignError(
         f"the records are too short for blocks of {fits.block_s:.3g} s"
         f"{', of which the last third of each is held out' if thirds else ''}: "
         f"{'hold whole records out (--test), ' if thirds else ''}make them longer, or say a shorter "

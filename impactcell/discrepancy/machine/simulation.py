@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import PRIOR_REACH, Response
-from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, OpenLoopError
+from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
 from impactcell.discrepancy.machine.held_out_stretch import (
     OFFSET_STEPS,
     RECORD_STEPS,
@@ -25,6 +25,7 @@ from impactcell.discrepancy.machine.held_out_stretch import (
 )
 from impactcell.discrepancy.machine.model_forces import law_of
 from impactcell.discrepancy.machine.motion_scale import MotionScale, carried_load, half_supports, is_told
+from impactcell.discrepancy.machine.open_loop_error import OpenLoopError
 from impactcell.discrepancy.machine.smoothing import averaged, smoothed_acceleration, smoothed_speed
 from impactcell.discrepancy.machine.step_forces import Drive, drive_of
 from impactcell.discrepancy.machine.uniform_records import UniformRecord

@@ -12,7 +12,7 @@ from impactcell.discrepancy.report.german_words import phrase as channel_name
 from impactcell.discrepancy.report.german_words import term_name as phrase
 from impactcell.discrepancy.report.machine_sentences import law_equation, noise_keys, why_not_named
 from impactcell.german.findings import enumerated
-from impactcell.german.open_loop import german_open_loop_sentence
+from impactcell.german.open_loop import german_better_sentence, german_open_loop_sentence
 from impactcell.physics.effect_names import as_title
 
 __all__ = ["equation", "headline", "label", "note", "phrase", "reason", "reference", "setting", "written"]
@@ -106,7 +106,11 @@ def headline(finding: MachineFinding) -> str:
             said += (
                 f" {says}, bringt die Abweichung auf {law.fall.after:.2f}: ein Gesetz, das keine Liste hatte."
             )
-    fit = finding.simulated[-1].fit_percent
+    errors, better = finding.simulated, finding.better_simulated
+    if better is not None:
+        rmse, names = (errors[-1].rmse, better.rmse), enumerated([*map(phrase, better.names)], "oder")
+        said += f" {german_better_sentence(names, rmse, finding.base.unit)}"
+    fit = errors[-1].fit_percent
     follows = german_open_loop_sentence(channel_name(finding.base.response), fit)
     return f"{written(said)} {follows}".rstrip()
 

@@ -11,6 +11,7 @@ from impactcell.discrepancy.report.german_held_numbers import column_slip, held_
 from impactcell.discrepancy.report.german_patterns import Patterns, marked, translated
 from impactcell.discrepancy.report.german_words import phrase, term_name
 from impactcell.german.data_faults import german_data_fault, german_message
+from impactcell.german.findings import enumerated
 from impactcell.physics.effect_names import as_title, identifier_of
 
 AT_REST: Final = {"before contact": "vor dem Kontakt", "after the tap": "nach dem Stoß"}
@@ -231,6 +232,19 @@ NOTES: Final[Patterns] = (
      lambda m: f"{said} erklärt fast alles, was eine Funktion von Geschwindigkeit, Last oder Ort erklärte; "
      f"das Gesetz gilt dem, was daneben bleibt, und hat {key_of(m[2])}."
      if (said := as_title(held_number(m[1]))) else ""),
+    ((r"(.+): blocks do not show it, but simulated open loop, held-out records are (\S+ .+?) off with it, "
+      r"(\S+) without: put (\S+) in the base model and compare\. .+ is stated \((\w+)\), would .*"),
+     lambda m: f"{_any_of(m[1])}: Blöcke zeigen es nicht, aber ohne Rückführung simuliert liegen "
+     f"zurückgehaltene Messungen mit ihm um {m[2]} daneben, ohne um {m[3]}: {m[4]} in das Grundmodell setzen "
+     "und vergleichen. Längere Messungen, ein feinerer oder schnellerer Sensor oder sein Rauschen, wo das "
+     f"angegeben ist ({m[5]}), würden es in Blöcken zeigen."),
+    (r"What is held out, the last third of each record, is nearly at rest: it moves (\S+) times .*",
+     (r"Zurückgehalten wird das letzte Drittel jeder Messung, und das ist fast in Ruhe: Es bewegt sich "
+      r"\1-mal so weit wie die ganze Messung. Ganze Messungen zurückhalten (--test) oder die Messungen "
+      "früher enden lassen.")),
+    (r"delay_s comes to rest at (\S+ s), the end of what the base model allows: .*",
+     (r"delay_s bleibt bei \1 stehen, am Ende dessen, was das Grundmodell zulässt: Zu prüfen ist, ob Kraft "
+      "und Position eine Uhr haben; sonst delay_s ein größeres std geben.")),
     (r"Simulated open loop, held-out records are (\S+ .+?) off with it, (\S+) without\.",
      r"Ohne Rückführung simuliert liegen zurückgehaltene Messungen mit ihm um \1 daneben, ohne um \2."),
 )  # fmt: skip
@@ -244,6 +258,11 @@ def note(english: str) -> tuple[str, str]:
 
 def _terms(names: str) -> str:
     return ", ".join(term_name(identifier_of(name)) for name in names.split(", "))
+
+
+def _any_of(names: str) -> str:
+    """Name terms of which one is enough."""
+    return enumerated([*map(_terms, re.split(", | or ", names))], "oder")
 
 
 def _parts(english: str) -> str:

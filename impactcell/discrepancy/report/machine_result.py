@@ -58,7 +58,7 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
                 "expected_without_gap": [round_digits(bound) for bound in finding.expected],
             },
         },
-        "simulation": _simulation(finding, (before, after)),
+        "simulation": _simulation(finding, (before, after)) | {"better_with": _better(finding)},
         **_law(finding),
         "next_experiment": experiments(finding.experiments),
         "nominal": _nuisances(finding.final)
@@ -189,6 +189,12 @@ def _simulation(finding: MachineFinding, errors: tuple[OpenLoopError, OpenLoopEr
         "fit_percent": {name: round_digits(error.fit_percent) for name, error in when.items()},
         "relative_force_error": {name: round_digits(error.relative_force) for name, error in when.items()},
     }
+
+
+def _better(finding: MachineFinding) -> dict[str, Any] | None:
+    """Terms, any of which blocks do not show, and with which the simulation errs far less."""
+    better = finding.better_simulated
+    return None if better is None else {"effects": list(better.names), "rmse": round_digits(better.rmse)}
 
 
 def _effect(finding: MachineFinding, term: ChosenTerm) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from impactcell.discrepancy.machine import FREE_FORMS, LAW_PLACES, MachineFindin
 from impactcell.discrepancy.report.machine_parameters import law_covariate
 from impactcell.discrepancy.report.sentences import equation, label, note, reason, setting, written
 from impactcell.german.findings import enumerated
-from impactcell.german.open_loop import open_loop_sentence
+from impactcell.german.open_loop import better_sentence, open_loop_sentence
 from impactcell.physics.effect_names import as_title, in_words
 
 __all__ = ["equation", "headline", "label", "note", "phrase", "reason", "reference", "setting", "written"]
@@ -38,7 +38,11 @@ def headline(finding: MachineFinding) -> str:
             )
         else:
             said += f" {says}, takes the held-out gap to {law.fall.after:.2f}: a law that nobody had listed."
-    fit = finding.simulated[-1].fit_percent
+    errors, better = finding.simulated, finding.better_simulated
+    if better is not None:
+        rmse, names = (errors[-1].rmse, better.rmse), enumerated([*map(phrase, better.names)], "or")
+        said += f" {better_sentence(names, rmse, finding.base.unit)}"
+    fit = errors[-1].fit_percent
     return f"{said} {open_loop_sentence(finding.base.response, fit, 'records')}".rstrip()
 
 

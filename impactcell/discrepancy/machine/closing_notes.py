@@ -1,0 +1,111 @@
+"""What is said of a finding once it is done: by simulation, and where a number rests at its bound."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from impactcell.campaign import COLUMNS
+from impactcell.discrepancy.machine.finding import MachineFinding
+from impactcell.discrepancy.machine.held_number import DELAY
+from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.open_loop_error import BetterSimulation
+from impactcell.discrepancy.machine.simulation import STEPS_PER_PERIOD, simulate_held_out
+from impactcell.discrepancy.machine.trials import ChosenTerm
+from impactcell.german.findings import enumerated
+from impactcell.german.open_loop import POOR_FIT_PERCENT
+from impactcell.physics.effect_names import in_words
+
+MUCH_BETTER = 0.5
+"""Share of the base model's error that the simulation with a term may leave for the term to be told. Our
+choice."""
+MOST_STEPS = 50_000
+"""Steps of simulations by which terms are tried, all together: of long records those that fit best [1]."""
+LEAST_TRIED = 3
+"""Terms that are tried however long the records are. Our choice."""
+MOST_TOLD = 3
+"""Terms that are told at most. Our choice."""
+REST_SHARE = 0.1
+"""Share of a record's motion below which what is held out of it is called at rest. Our choice."""
+
+
+def with_closing_notes(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
+    """Say which term simulates far better where none is established, and what else goes by the outcome."""
+    better = _best_simulated(fits, finding)
+    notes = [*finding.notes, *_note_of_delay(finding)]
+    if fits.held is None:
+        notes += _note_of_rest(finding)
+    if better is not None:
+        sensor = COLUMNS[finding.base.coordinate]["position_noise"]
+        notes.append(
+            f"{enumerated([*map(in_words, better.names)], 'or')}: blocks do not show it, but simulated open "
+            f"loop, held-out records are {better.rmse:.3g} {finding.base.unit} off with it, "
+            f"{finding.simulated[-1].rmse:.3g} without: put {better.names[0]} in the base model and compare. "
+            "Longer records, a finer or faster sensor, or its noise where that is stated "
+            f"({sensor}), would show it in blocks."
+        )
+    return replace(finding, notes=tuple(notes), better_simulated=better)
+
+
+def _best_simulated(fits: MachineFits, finding: MachineFinding) -> BetterSimulation | None:
+    """Give terms with which the held-out simulation errs half as much or less, the best first."""
+    if finding.established or finding.law is not None or not finding.errs_beyond_noise:
+        return None
+    errors: dict[str, float] = {}
+    for term in _tried(fits, finding):
+        model = fits.fit((*finding.nominal.terms, term), settle=False)
+        if any(model.value(column) for column in term.columns):
+            errors[term.choice.name] = simulate_held_out(finding, model).rmse
+    most = MUCH_BETTER * finding.simulated[-1].rmse
+    names = sorted((name for name, rmse in errors.items() if rmse <= most), key=errors.__getitem__)
+    return BetterSimulation(tuple(names[:MOST_TOLD]), errors[names[0]]) if names else None
+
+
+def _tried(fits: MachineFits, finding: MachineFinding) -> list[ChosenTerm]:
+    """Terms of the catalogue but those by columns, as many as may be simulated: what fits best first.
+
+    With the shapes that the search gave them; where there were too few blocks for it those that have none.
+    """
+    grids = fits.grids
+    terms = [
+        ChosenTerm(choice, grids[choice.name][0])
+        for choice in fits.candidates
+        if len(grids[choice.name]) == 1
+    ]
+    if finding.steps:
+        terms = [trial.term for trial in finding.steps[0].trials]
+    longest_s = max(end - begin for _, begin, end in finding.held_spans)
+    step_s = min(record.step_s for record in finding.records)
+    steps = longest_s / min(step_s, finding.scale.period_s / STEPS_PER_PERIOD)
+    most = max(int(MOST_STEPS / steps), LEAST_TRIED)
+    return [term for term in terms if not term.choice.covariate][:most]
+
+
+def _note_of_rest(finding: MachineFinding) -> list[str]:
+    """Say that the last thirds, which are held out, hardly move, where a simulation follows them poorly."""
+    if not finding.errs_beyond_noise or finding.simulated[-1].fit_percent >= POOR_FIT_PERCENT:
+        return []
+    shares = []
+    for place, begin_s, end_s in finding.held_spans:
+        record = finding.records[place]
+        inside = (record.time_s >= begin_s) & (record.time_s <= end_s)
+        shares.append(float(np.ptp(record.position[inside]) / np.ptp(record.position)))
+    if max(shares, default=math.inf) > REST_SHARE:
+        return []
+    note = (
+        f"What is held out, the last third of each record, is nearly at rest: it moves {max(shares):.2g} "
+        "times as far as the whole record. Hold whole records out (--test), or end the records earlier."
+    )
+    return [note]
+
+
+def _note_of_delay(finding: MachineFinding) -> list[str]:
+    """Say that the delay of the force would be another if it might."""
+    fit = finding.final.fit
+    if DELAY not in fit.columns or not fit.at_bound[fit.columns.index(DELAY)]:
+        return []
+    note = (
+        f"delay_s comes to rest at {finding.final.delay_s:.3g} s, the end of what the base model allows: see "
+        "whether force and position have one clock, or give delay_s a larger std."
+    )
+    return [note]

@@ -1,0 +1,120 @@
+"""What a finding says at its end: what simulation shows, what is at rest, and a delay at its bound."""
+
+import json
+import math
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from impactcell.campaign import Campaign, Coordinate, Excitation
+from impactcell.discrepancy.machine import (
+    BaseModel,
+    MachineFinding,
+    NumberPrior,
+    TermChoice,
+    investigate_machine,
+)
+from impactcell.discrepancy.report import german_machine_sentences, machine_sentences
+from impactcell.discrepancy.report.machine_result import machine_document
+from impactcell.german.findings import german_headline
+from impactcell.records import Capture, Channel
+
+pytestmark = pytest.mark.slow
+
+GRAVITY, NOISE = 29.4, 0.01
+"""m g l over the inertia, 1/s², and the noise of a video's angles."""
+
+
+@lru_cache
+def filmed(viscous: float, *terms: str) -> MachineFinding:
+    """A bob on a string, filmed for 30 s at 30 frames a second, from 1 rad: by an integrator of its own."""
+    time = np.arange(0.0, 30.0, 1.0 / 30.0)
+    run = solve_ivp(
+        lambda _, state: (state[1], -GRAVITY * math.sin(state[0]) - viscous * state[1]),
+        (0.0, 30.0), (1.0, 0.0), t_eval=time, rtol=1e-9, atol=1e-11,
+    )  # fmt: skip
+    angle = run.y[0] + np.random.default_rng(1).normal(0.0, NOISE, time.size)
+    shot = Capture(1, math.nan, math.nan, None, Channel(time, angle))
+    base = BaseModel(
+        coordinate=Coordinate.ROTATION,
+        inertia=NumberPrior(1.0),
+        gravity_torque=NumberPrior(GRAVITY, math.inf),
+        terms=tuple(map(TermChoice, terms)),
+    )
+    return investigate_machine(Campaign(Excitation.FREE_SLIDE, (shot,), coordinate=Coordinate.ROTATION), base)
+
+
+def test_a_damping_that_only_the_simulation_shows_is_told() -> None:
+    """Blocks of a period show nothing beside such noise; in ten seconds half of the swing is gone."""
+    finding = filmed(0.15)
+    assert not finding.established
+    better = finding.better_simulated
+    assert better is not None
+    assert {"viscous_friction", "quadratic_drag"} & {*better.names}
+    assert better.rmse <= 0.5 * finding.simulated[-1].rmse
+    assert finding.verdict == "untested"
+    result = json.loads(json.dumps(machine_document(finding)))
+    assert result["simulation"]["better_with"] == {
+        "effects": list(better.names),
+        "rmse": pytest.approx(better.rmse, rel=1e-3),
+    }
+    off = f"{better.rmse:.3g} rad off"
+    assert off in result["headline"]
+    [note] = [note for note in result["notes"] if f"put {better.names[0]} in the base model" in note]
+    assert off in note
+    assert "noise_std_rad" in note
+    language, german = german_machine_sentences.note(note)
+    assert language == "de"
+    assert all(german_machine_sentences.phrase(name) in german for name in better.names)
+    numbers = f"{better.rmse:.3g} rad".replace(".", ",")
+    for said in (german, german_machine_sentences.headline(finding), german_headline(result)):
+        assert numbers in said
+    assert machine_sentences.headline(finding) == result["headline"]
+
+
+def test_where_the_base_model_has_it_none_is_told() -> None:
+    finding = filmed(0.15, "viscous_friction")
+    assert finding.better_simulated is None
+    assert machine_document(finding)["simulation"]["better_with"] is None
+    assert not any("in the base model and compare" in note for note in finding.notes)
+
+
+def test_held_out_thirds_at_rest_are_told() -> None:
+    """A swing that is over after half of the record, and a base model with another gravity."""
+    time = np.arange(0.0, 9.0, 0.01)
+    rng = np.random.default_rng(5)
+    angle = 0.1 * np.exp(-0.6 * time) * np.cos(5.4 * time)
+    shots = [
+        Capture(number, math.nan, math.nan, None, Channel(time, read))
+        for number, read in enumerate(angle + rng.normal(0.0, 1e-5, (2, time.size)), 1)
+    ]
+    base = BaseModel(
+        coordinate=Coordinate.ROTATION, inertia=NumberPrior(0.02), gravity_torque=NumberPrior(0.3)
+    )
+    finding = investigate_machine(
+        Campaign(Excitation.FREE_SLIDE, tuple(shots), coordinate=Coordinate.ROTATION), base
+    )
+    [note] = [note for note in finding.notes if "nearly at rest" in note]
+    assert german_machine_sentences.note(note)[0] == "de"
+
+
+@pytest.mark.parametrize(("std", "says"), [(0.002, True), (0.02, False)])
+def test_a_delay_at_its_bound_is_told(std: float, says: bool) -> None:
+    """1 kg that three sines drive, its force recorded 20 ms late."""
+    time = np.arange(0.0, 20.0, 0.005)
+    rates, phases = (2.0, 5.1, 9.7), (0.3, 1.9, 4.0)
+    force = sum(np.sin(w * (time - 0.02) + at) for w, at in zip(rates, phases, strict=True))
+    position = sum(-np.sin(w * time + at) / w**2 for w, at in zip(rates, phases, strict=True))
+    rng = np.random.default_rng(6)
+    channels = [
+        Channel(time, values + rng.normal(0.0, noise, time.size), noise)
+        for values, noise in ((force, 1e-2), (position, 1e-5))
+    ]
+    campaign = Campaign(Excitation.DRIVEN, (Capture(1, math.nan, 1.0, *channels),))
+    base = BaseModel(inertia=NumberPrior(1.0), delay_s=NumberPrior(0.0, std))
+    finding = investigate_machine(campaign, base)
+    notes = [note for note in finding.notes if note.startswith("delay_s comes to rest")]
+    assert bool(notes) is says
+    assert all(german_machine_sentences.note(note)[0] == "de" for note in notes)
