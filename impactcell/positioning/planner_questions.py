@@ -92,7 +92,7 @@ def check_observation(tap: Tap, moved_m: float, mass_kg: float, slowing_m_s2: fl
     if moved_m < -BACK_M:
         raise PositioningError(
             f"cannot learn from a displacement of {moved_m:g} m: it is positive along the tap; give what the "
-            "position has changed by, times the tap's direction"
+            "position has changed by, times the tap's direction, and nothing where a hand has moved the part"
         )
     stroke_m = tap.stroke_m if tap.stroke_m < math.inf else LONGEST_M
     furthest_m = FURTHER * tap.velocity_m_s**2 / (2.0 * slowing_m_s2) + stroke_m

@@ -82,7 +82,7 @@ def test_components_beyond_what_is_affordable_join_their_neighbours() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("odd", ["thrown back", "replaced further off", "stuck", "three times as far"])
+@pytest.mark.parametrize("odd", ["stuck", "three times as far"])
 def test_a_part_that_was_moved_once_is_no_sign_of_a_model_that_lacks_something(odd: str) -> None:
     rng, planner, told, doubted = np.random.default_rng(0), new_planner(), [], False
     for task in range(14):
@@ -91,9 +91,7 @@ def test_a_part_that_was_moved_once_is_no_sign_of_a_model_that_lacks_something(o
         while isinstance(tap := planner.next_tap(remaining, mass_kg), Tap):
             moved = displacement_m(tap, mass_kg, rng)
             if is_odd:
-                moved = {"thrown back": -5e-3, "replaced further off": -12e-3, "stuck": 0.0}.get(
-                    odd, 3.0 * moved
-                )
+                moved = 0.0 if odd == "stuck" else 3.0 * moved
             planner.observe(tap, moved, mass_kg)
             doubted |= is_odd and planner.posterior.watch.doubted
             is_odd, remaining = False, remaining - moved
