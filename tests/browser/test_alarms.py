@@ -113,6 +113,7 @@ def test_what_somebody_writes_stays_until_he_wants_the_list_anew(
     assert not browser.all("#renew:not([hidden])")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_acknowledged", [False, True], ids=["not acknowledged", "to be confirmed"])
 def test_enter_does_what_the_field_is_for(
     server: PageServer, backend: Backend, browser: Browser, *, is_acknowledged: bool
@@ -128,6 +129,7 @@ def test_enter_does_what_the_field_is_for(
     assert done == [(EventKind.SHELVE_TIMED, "", 2700.0), (EventKind.COMMENT, "seen", 0.0)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["/", f"/cells/{CELLS[0]}"])
 def test_what_is_shelved_hides_nothing_that_is_open(server: PageServer, browser: Browser, path: str) -> None:
     opened = replace(raised("a scratch"), acknowledged=True)

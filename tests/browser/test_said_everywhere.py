@@ -42,6 +42,7 @@ def count(browser: Browser) -> str:
     return "".join(place.text for place in browser.all("#open-alarms:not([hidden])"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "path", ["/", f"/cells/{CELLS[0]}", "/alarms", "/studies", "/studies/{study}", "/system"]
 )
@@ -60,6 +61,7 @@ def test_the_count_of_open_alarms_is_of_now_and_of_all_cells(
     browser.until(lambda: count(browser) == "2", "both alarms")
 
 
+@pytest.mark.slow
 def test_what_came_of_a_form_is_said_once(server: PageServer, browser: Browser) -> None:
     for path, said in (
         (f"/cells/{CELLS[0]}?done=reset-wear", "learned anew, from the next cycle on"),
@@ -76,12 +78,14 @@ def test_what_came_of_a_form_is_said_once(server: PageServer, browser: Browser) 
         assert said not in browser.text, address
 
 
+@pytest.mark.slow
 def test_a_form_without_a_file_says_so(server: PageServer, browser: Browser) -> None:
     for language, said in (("en", "Choose files, or drop them here."), ("de", "Bitte Dateien wählen")):
         browser.open(f"{server.endpoint}/studies?lang={language}")
         browser.until(lambda: browser.find("#drop-form button").click() or said in browser.text, said)  # noqa: B023
 
 
+@pytest.mark.slow
 def test_charts_say_that_there_was_no_tap_yet(server: PageServer, browser: Browser) -> None:
     for language, said in (
         ("en", "no tap since the service was started"),

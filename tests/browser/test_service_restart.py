@@ -91,6 +91,7 @@ def enter(browser: Browser) -> None:
     browser.until(lambda: states(browser) == {"● live"}, "a cell that is live")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("has_proxy", [False, True], ids=["nobody answers", "a proxy answers"])
 def test_a_page_waits_for_the_service_that_was_ended_in_order(
     browser: Browser, tmp_path: Path, *, has_proxy: bool

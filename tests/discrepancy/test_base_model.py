@@ -31,6 +31,8 @@ from impactcell.errors import CampaignError, SettingsError
 from impactcell.records import Capture, Channel
 from impactcell.settings.base_model import base_model_text, read_base_model
 
+pytestmark = pytest.mark.slow
+
 INERTIA, GRAVITY = 0.02, 0.6
 """Of the pendulum [kg m²] and m g l [N m]."""
 NOISE = 2e-5

@@ -40,6 +40,7 @@ def at_ends(record: UniformRecord, name: str) -> np.ndarray:
     return lost
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["force", "position"])
 @pytest.mark.parametrize("response", Response)
 def test_what_is_clipped_is_no_gap_of_the_model(name: str, response: Response) -> None:

@@ -16,6 +16,8 @@ from simulator.campaign import make
 from simulator.campaign_scenario import CampaignScenario
 from tests.discrepancy.study import Job, campaign, recorded, strengths, with_column
 
+pytestmark = pytest.mark.slow
+
 COLUMN = "oil temperature"
 FEW = ("friction_drift", "direction_asymmetry", "viscous_friction")
 """What may be named: enough to go wrong, and quick to search."""

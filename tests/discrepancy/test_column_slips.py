@@ -112,15 +112,18 @@ def turned(numbers: set[int]) -> Change:
     return lambda number, time, force, position: (time, -force if number in numbers else force, position)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("base", [AXIS, PULLED], ids=["position", "force"])
 def test_a_turned_force_is_told_and_nothing_is_named(base: BaseModel) -> None:
     assert is_told(investigate_machine(axis(turned({1, 2, 3, 4})), base), "force_n or position_m turned")
 
 
+@pytest.mark.slow
 def test_a_force_that_is_turned_in_one_shot_is_told_with_the_shot() -> None:
     assert is_told(investigate_machine(axis(turned({2})), AXIS), "force_n or position_m turned in shot 2")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "mass_kg", "words"),
     [
@@ -136,6 +139,7 @@ def test_another_unit_is_told_and_nothing_is_named(change: Change, mass_kg: floa
     assert is_told(finding, words)
 
 
+@pytest.mark.slow
 def test_degrees_of_a_pendulum_are_told_and_are_no_law() -> None:
     shots = []
     for shot in swings(4e-4):
@@ -151,6 +155,7 @@ def test_nothing_is_asked_for_where_records_follow_the_base_model() -> None:
     assert not any("Records follow" in note for note in finding.notes)
 
 
+@pytest.mark.slow
 def test_a_name_with_which_records_are_followed_less_than_a_constant_is_not_given() -> None:
     """A mass of next to nothing, which is none of a unit: friction by the load takes the drive away."""
     finding = investigate_machine(axis(), replace(AXIS, inertia=NumberPrior(1e-9)))
@@ -161,6 +166,7 @@ def test_a_name_with_which_records_are_followed_less_than_a_constant_is_not_give
     assert (language, "eine Konstante um" in said) == ("de", True)
 
 
+@pytest.mark.slow
 def test_no_law_is_proposed_with_which_records_are_followed_less_than_a_constant() -> None:
     found = investigate_machine(axis(), AXIS)
 
@@ -224,6 +230,7 @@ def test_an_encoder_is_told_up_to_three_degrees_and_an_inertia_beside_known_grav
     assert "inertia" not in [one.name for one in swinging], "of a free swing only gravity over inertia shows"
 
 
+@pytest.mark.slow
 def test_an_inertia_that_is_held_wrong_beside_known_gravity_is_told_and_no_encoder() -> None:
     base = BaseModel(
         coordinate=Coordinate.ROTATION,
@@ -238,6 +245,7 @@ def test_an_inertia_that_is_held_wrong_beside_known_gravity_is_told_and_no_encod
     assert not any("encoder" in note or "gravity would" in note for note in finding.notes)
 
 
+@pytest.mark.slow
 def test_a_mass_where_none_was_taken_is_told_by_its_size() -> None:
     finding = investigate_machine(axis(), replace(PULLED, inertia=NumberPrior(0.0)))
     assert (finding.verdict, finding.established, finding.law) == ("unknown", (), None)

@@ -33,6 +33,8 @@ from tests.discrepancy.stick_slip import (
     slides,
 )
 
+pytestmark = pytest.mark.slow
+
 QUIET, NOISY = (0.02, 1e-5), (0.02, 1e-4)
 """Noise of force [N] and position [m]."""
 

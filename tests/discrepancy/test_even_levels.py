@@ -11,6 +11,8 @@ from impactcell.discrepancy.machine.uniform_records import uniform_records
 from impactcell.records import Samples
 from tests.discrepancy.stick_slip import SLIDE, VISCOUS_N_S_PER_M, slides
 
+pytestmark = pytest.mark.slow
+
 LACKING = replace(SLIDE, terms=(TermChoice("coulomb_friction"),))
 
 

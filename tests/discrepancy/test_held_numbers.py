@@ -111,6 +111,7 @@ def turned() -> MachineFinding:
     return investigate_machine(pendulum(swings(0.0, offset=0.02)), base)
 
 
+@pytest.mark.slow
 def test_a_zero_of_the_angle_that_is_held_is_told_and_is_no_law() -> None:
     finding = turned()
     assert (finding.verdict, finding.established) == ("unknown", ())
@@ -126,6 +127,7 @@ def test_a_zero_of_the_angle_that_is_held_is_told_and_is_no_law() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_torque_of_gravity_that_is_held_wrong_is_told_with_its_size() -> None:
     base = replace(PENDULUM, gravity_torque=NumberPrior(0.95 * GRAVITY))
     finding = investigate_machine(pendulum(swings(0.0)), base)
@@ -135,6 +137,7 @@ def test_a_torque_of_gravity_that_is_held_wrong_is_told_with_its_size() -> None:
     assert "a free gravity_torque_n_m in the base model would tell" in finding.law_refused
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mass_kg", [1.05 * MASS_KG, 0.9 * MASS_KG])
 def test_a_mass_that_is_held_wrong_is_told_and_is_no_spring(mass_kg: float) -> None:
     """Where nothing but the mass takes force it is its product with the gain that is off; both are told."""
@@ -178,6 +181,7 @@ def test_a_mass_that_is_held_wrong_is_told_beside_the_gain_from_a_given_force(of
     assert german in german_machine_sentences.headline(finding)
 
 
+@pytest.mark.slow
 def test_a_zero_of_the_force_that_is_held_is_told_and_is_no_law() -> None:
     finding = investigate_machine(slide(zero_n=0.5), replace(SLIDE, force_offset=NumberPrior()))
     assert finding.established == ()
@@ -185,6 +189,7 @@ def test_a_zero_of_the_force_that_is_held_is_told_and_is_no_law() -> None:
     assert finding.law is None
 
 
+@pytest.mark.slow
 def test_a_late_force_is_told_and_is_no_law_of_the_speed() -> None:
     finding = investigate_machine(slide(late_s=6e-3), SLIDE)
     assert finding.established == ()

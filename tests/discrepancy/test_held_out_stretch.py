@@ -90,6 +90,7 @@ def test_a_part_drifts_where_nothing_pulls_it_back(changed: dict[str, Any], expe
     assert drifts(replace(BaseModel(force_offset=FREE), **changed)) is expected
 
 
+@pytest.mark.slow
 def test_a_predicted_force_errs_by_no_more_than_the_model_where_the_part_is_ramped() -> None:
     """Beside noise of 0.3 N a wave of 0.5 N is all that the model lacks; ramps are of 76 N."""
     base = replace(ramped.BASE, response=Response.FORCE)

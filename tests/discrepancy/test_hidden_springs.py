@@ -29,6 +29,8 @@ from tests.discrepancy.stick_slip import SLIDE, VISCOUS_N_S_PER_M, sines, slides
 from tests.discrepancy.test_base_model import GRAVITY, pendulum, swings
 from tests.discrepancy.test_moves_between_places import AXIS, axis, strength
 
+pytestmark = pytest.mark.slow
+
 INERTIA, STIFFNESS, VISCOUS = 0.02, 0.5, 0.004
 """Of what oscillates [kg m², N m/rad and N m s/rad; the same in kg and N/m]."""
 WIDE, NARROW = (2.0, 1.8, 1.5, 1.9), (0.1, 0.08, 0.12, 0.09)

@@ -89,6 +89,7 @@ def strength(finding: MachineFinding, name: str) -> float:
     return finding.final.value(term.columns[0])
 
 
+@pytest.mark.slow
 def test_nothing_is_hidden_in_an_axis_that_rests_between_its_moves() -> None:
     finding = investigate_machine(axis(), AXIS)
     assert finding.verdict == "no_gap"

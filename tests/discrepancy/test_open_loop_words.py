@@ -40,6 +40,7 @@ def swings(rates: list[float], lasting_s: float) -> Campaign:
     return Campaign(Excitation.FREE_SLIDE, tuple(shots), coordinate=Coordinate.ROTATION)
 
 
+@pytest.mark.slow
 def test_logs_that_are_not_of_one_machine_are_asked_after(tmp_path: Path) -> None:
     campaign = swings([3.0, 9.0, 3.2, 8.0], 8.0)
     finding = investigate_machine(campaign, PENDULUM)
@@ -121,6 +122,7 @@ def test_a_run_down_of_what_turns_is_no_slide(tmp_path: Path) -> None:
     assert (language, "Grundmodell" in said) == ("de", True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("gravity", [0.55, 0.0])
 def test_a_swing_that_ends_where_it_began_is_no_presliding(gravity: float) -> None:
     """Nor where the base model has no gravity: that is what is asked after, and nobody strikes a pendulum."""

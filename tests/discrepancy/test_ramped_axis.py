@@ -68,11 +68,13 @@ def finding(campaign: Campaign) -> MachineFinding:
     return found(campaign, BASE)
 
 
+@pytest.mark.slow
 def test_two_records_of_a_ramped_axis_are_enough(finding: MachineFinding) -> None:
     assert finding.verdict == "named"
     assert finding.established == ("directional_viscous_friction",)
 
 
+@pytest.mark.slow
 def test_mass_and_friction_are_those_that_went_in(finding: MachineFinding) -> None:
     mass = 1.1 * MASS * (1.0 + finding.final.nuisance("inertia"))
     assert mass == pytest.approx(MASS, rel=0.02)

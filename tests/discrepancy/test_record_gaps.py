@@ -71,6 +71,7 @@ def test_a_gap_of_one_channel_is_one_of_the_record(channel: str) -> None:
         assert (low, high) == pytest.approx((0.7 - late, 0.952 + late), abs=0.005)
 
 
+@pytest.mark.slow
 def test_the_simulation_begins_anew_after_each_gap() -> None:
     finding = investigate_machine(with_gaps([(2, 10.6, 0.25)]), SLIDE)
     [before, after] = [(begin, end) for place, begin, end in finding.held_spans if place == 1]

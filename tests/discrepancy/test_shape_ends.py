@@ -50,6 +50,7 @@ def cogging() -> MachineFinding:
     return investigate_machine(axis(lambda q, _: 0.5 * np.sin(2.0 * np.pi * q / 0.0206)), AXIS)
 
 
+@pytest.mark.slow
 def test_cogging_that_is_finer_than_what_is_looked_for_is_told_as_such() -> None:
     finding = cogging()
     assert finding.established == ()

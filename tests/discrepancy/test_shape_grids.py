@@ -8,6 +8,8 @@ from impactcell.discrepancy.machine import investigate_machine
 from impactcell.records import Samples
 from tests.discrepancy.test_smooth_force import SLIDE, slide
 
+pytestmark = pytest.mark.slow
+
 SEED = 7
 
 

@@ -29,6 +29,8 @@ from impactcell.discrepancy.machine.weak_form import Column, Rows
 from impactcell.discrepancy.report.machine_page import format_need
 from impactcell.records import Capture, Channel, Samples
 
+pytestmark = pytest.mark.slow
+
 OFFSET, FREE, OWN, DRAG = ("offset", 0.0, 0), ("free", 0.0, 0), ("own", 0.0, 0), ("drag", 0.0, 0)
 RANGES = {"position": (-0.3, 0.7), "speed": (0.0, 2.0), "load": (0.0, 1.0)}
 Law = Callable[[Samples, Samples], Samples]

@@ -15,6 +15,8 @@ from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.discrepancy.report.machine_sentences import noise_keys
 from impactcell.records import Capture, Channel
 
+pytestmark = pytest.mark.slow
+
 INERTIA, VISCOUS, STEP_S, NOISE = 1.2e-4, 2e-4, 5e-3, 0.05
 """kg m², N m s/rad, s and rad/s."""
 MOTOR = BaseModel(

@@ -310,6 +310,7 @@ def test_replicate_spread_is_that_of_the_scatter() -> None:
     assert np.sqrt(np.mean(np.square(spreads))) == pytest.approx(0.01, rel=0.05)
 
 
+@pytest.mark.slow
 def test_an_effect_of_the_plant_gives_way_to_the_one_that_is_there() -> None:
     """Its velocity runs to its end as its strength comes to nothing: no fault of the new name."""
     plant = Plant(

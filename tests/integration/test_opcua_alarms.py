@@ -62,6 +62,7 @@ async def act(here: Site, client: Client, method: str, event_id: bytes, comment:
     return (await client.uaclient.call([request]))[0].StatusCode.value
 
 
+@pytest.mark.slow
 async def test_an_alarm_that_stands_sends_no_event_a_cycle() -> None:
     """Active and acknowledged: only a step of what it watches, and another severity, are told."""
     wear = RULES["WearLimit"].settings
@@ -298,6 +299,7 @@ async def test_the_last_severity_is_that_before_the_last_change_of_it() -> None:
         assert (await past(here, client, raised)).LastSeverity == 0
 
 
+@pytest.mark.slow
 async def test_a_state_tells_since_when_it_is(tmp_path: Path) -> None:
     """OPC 10000-9: TransitionTime is when the state was entered, SourceTimestamp when the value changed."""
     async with site(directory=tmp_path) as here, await here.client("engineer") as client:

@@ -71,6 +71,7 @@ async def test_a_refresh_is_no_act(caplog: pytest.LogCaptureFixture) -> None:
     assert [r for r in caplog.records if r.name == "impactcell.audit"] == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("made_up", "arguments"),
     [

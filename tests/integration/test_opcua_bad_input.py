@@ -149,6 +149,7 @@ async def test_half_open_connections_are_closed_in_time() -> None:
         await alive(here)
 
 
+@pytest.mark.slow
 async def test_too_many_connections() -> None:
     async with (
         site(limits=ServerLimits(connections=5, undisturbed_s=3600.0, **PATIENT)) as here,

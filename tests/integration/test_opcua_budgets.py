@@ -93,6 +93,7 @@ async def test_sessions_that_nobody_logs_in_to_give_way(undisturbed_s: float) ->
                 await (await here.node(newcomer, "Module/Connected")).read_data_value(False)
 
 
+@pytest.mark.slow
 async def test_one_address_has_its_places_and_no_more() -> None:
     limits = ServerLimits(connections=10, connections_per_address=2, undisturbed_s=3600.0, **SLOW)
     async with site(limits=limits) as here, contextlib.AsyncExitStack() as stack:

@@ -247,6 +247,7 @@ async def test_the_link_is_as_it_is_while_no_cycle_comes() -> None:
         assert seen[0] == seen[1]
 
 
+@pytest.mark.slow
 async def test_only_changes_are_told() -> None:
     async with site() as here, await here.client() as client:
         here.publish(0.2)

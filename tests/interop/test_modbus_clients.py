@@ -143,6 +143,7 @@ EXPECTED: dict[str, Any] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXPECTED)
 async def test_mbpoll_agrees_with_the_map(name: str) -> None:
     if shutil.which("mbpoll") is None:

@@ -26,6 +26,8 @@ from tests.interop.wire import Wire
 from tests.opcua_server import CELL, PASSWORDS, START_NS, Site, site
 from tests.patience import PATIENCE_S
 
+pytestmark = pytest.mark.slow
+
 HERE = Path(__file__).parent / "node"
 MODEL = Path(__file__).resolve().parents[2] / "impactcell" / "scada" / "model"
 OUTAGE_S = 5.0

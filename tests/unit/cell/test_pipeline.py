@@ -15,6 +15,8 @@ from impactcell.settings import read_cell
 from tests.integration.processes import CONFIG
 from tests.taps import VISCOUS, Tap
 
+pytestmark = pytest.mark.slow
+
 STRIBECK: dict[str, Any] = {
     "stribeck_friction": {"friction_increase": 0.03, "stribeck_velocity_m_s": 0.04},
 }

@@ -459,6 +459,7 @@ def pushed(velocity_mm_per_min: float, rest_s: float, stroke_m: float) -> list[C
     return shots
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("velocity", "rest_s", "stroke_m", "usable"),
     [(2000.0, 2.0, 1.5e-3, 4), (400.0, 0.05, 1.5e-3, 1)],

@@ -205,6 +205,7 @@ def test_what_has_to_be_said_is_named(tmp_path: Path, monkeypatch: pytest.Monkey
     assert not list(tmp_path.rglob("*.yaml")) or not (tmp_path / "d" / "own.yaml").exists()
 
 
+@pytest.mark.slow
 def test_a_map_that_says_otherwise_is_named_and_another_map_is_not_taken_for_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

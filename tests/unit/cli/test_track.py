@@ -115,6 +115,7 @@ def test_an_alarm_of_wear_that_is_over_is_told_so(tmp_path, capsys):
     assert line.endswith(f" above the limit; gone since cycle {alarm['cleared_cycle']}")
 
 
+@pytest.mark.slow
 def test_a_warning_of_what_has_come_is_not_told_to_be_over(tmp_path, capsys):
     path = write(tmp_path / "s.csv", truth(1200, slope=3e-5, at=1200))
     warning, limit = run(capsys, path, limit=0.23)["alarms"]

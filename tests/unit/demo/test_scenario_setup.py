@@ -64,6 +64,7 @@ def test_a_demo_says_when_its_tour_is_over(scenario: str) -> None:
         assert said == ()
 
 
+@pytest.mark.slow
 def test_the_simulator_ends_with_a_demo_that_is_killed(tmp_path: Path) -> None:
     text = (CONFIG / "sim" / "demo.yaml").read_text(encoding="utf-8")
     (tmp_path / "s.yaml").write_text(text.replace("../maps", str(CONFIG / "maps")), encoding="utf-8")

@@ -220,6 +220,7 @@ async def polled(server: ModbusServer, requests: int = 20) -> None:
         await asyncio.sleep(0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "made"), [("u16", 20), ("u16", 3), ("bcd16", 20), ("bcd16", 60)])
 async def test_a_start_soon_after_the_counter_went_round_begins_with_1(kind: str, made: int) -> None:
     """No cycle is made up of an empty buffer, and none of the new life has the number of one before."""
@@ -275,6 +276,7 @@ async def test_a_counter_of_0_without_a_tap_is_no_cycle(before: int, *, smallest
         assert (module.status.received, module.status.connected) == (1, True)
 
 
+@pytest.mark.slow
 async def test_a_counter_of_0_with_a_buffer_that_is_not_ready_is_no_cycle() -> None:
     """However long that lasts; the first tap comes when it is made."""
     layout = with_kind(with_kind(ONE_BUFFER, "cycle_counter", "u16"), "window_cycle", "u16")

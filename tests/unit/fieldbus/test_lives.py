@@ -53,6 +53,7 @@ def without_session(fpga: RegisterMap) -> RegisterMap:
     return replace(fpga, registers=kept)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("serial", ["", "SN2"], ids=["no serial number", "another serial number"])
 @pytest.mark.parametrize("clock_ns", [BEGIN, 0], ids=["a clock", "no clock"])
 @pytest.mark.parametrize("away", [1, 15, 20])
@@ -100,6 +101,7 @@ async def test_a_session_that_comes_again_in_another_life_is_read_from_its_oldes
         assert module.status.missed == 0
 
 
+@pytest.mark.slow
 async def test_a_session_of_before_a_restart_of_the_service_is_known(fpga: RegisterMap) -> None:
     device = ScriptedDevice(fpga, session=7)
     tap(device, BEGIN, 10)

@@ -47,6 +47,7 @@ async def test_a_wrong_word_order_is_refused_by_name_and_nothing_is_taken(
     assert device.acknowledged == []
 
 
+@pytest.mark.slow
 async def test_a_counter_that_goes_on_is_no_new_reason(
     layout: RegisterMap, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:

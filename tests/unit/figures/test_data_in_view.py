@@ -32,6 +32,7 @@ def drawings(monkeypatch: pytest.MonkeyPatch) -> dict[str, Callable[[Figure], No
     return found
 
 
+@pytest.mark.slow
 def test_no_panel_is_empty(
     drawn: Callable[[Callable[[Figure], None]], Figure], monkeypatch: pytest.MonkeyPatch
 ) -> None:

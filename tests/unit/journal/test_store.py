@@ -329,6 +329,7 @@ def test_a_capture_goes_with_its_cycle(tmp_path: Path) -> None:
         assert journal._db.execute("SELECT count(*) FROM captures").fetchone() == (0,)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keep", [Retention(days=1, captures_days=1), Retention(max_size_bytes=1)])
 def test_no_call_drops_everything_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, keep: Retention

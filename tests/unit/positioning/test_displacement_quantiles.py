@@ -36,6 +36,7 @@ def jump() -> float:
     return float(logarithms[n : n + 2].mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("deviations", [-2.5, 2.5])
 def test_a_jump_within_three_standard_deviations_is_within_the_band(deviations: float) -> None:
     """Of the ratio of frictions, which is known to half a per cent; friction itself hardly scatters."""

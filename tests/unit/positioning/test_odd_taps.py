@@ -100,6 +100,7 @@ def test_a_part_that_was_moved_once_is_no_sign_of_a_model_that_lacks_something(o
     assert not any(told)
 
 
+@pytest.mark.slow
 def test_a_sensor_that_scatters_is_reckoned_with() -> None:
     """4 µm of a reading, 5.7 of a displacement: two of these off, a push that is foretold well is none."""
     off_m = 2.0 * math.sqrt(2.0) * 4e-6

@@ -230,6 +230,7 @@ def test_the_bound_on_overshoot_is_kept_by_the_true_distribution() -> None:
         assert np.median(moved) == pytest.approx(tap.expected_m, rel=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3, 5, 8])
 def test_after_a_tap_far_astray_the_bound_on_overshoot_holds_again(seed: int) -> None:
     """Friction has dropped by 30 % and nobody said so: the tap that meets it is foretold wrongly, no more."""

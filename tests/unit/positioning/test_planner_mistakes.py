@@ -31,6 +31,7 @@ def in_a_process(code: str) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "told"),
     [
@@ -46,6 +47,7 @@ def test_what_has_no_end_is_refused(code: str, told: str) -> None:
     assert told in in_a_process(code)
 
 
+@pytest.mark.slow
 def test_a_push_without_end_is_no_endless_loop() -> None:
     told = in_a_process(
         "__import__('impactcell.physics.closed_form', fromlist=['_']).displacement_of(math.nan, *(__import__("

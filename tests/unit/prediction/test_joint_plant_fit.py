@@ -264,6 +264,7 @@ def test_scatter_of_the_ratio_is_what_its_errors_do_not_exclude(
     assert scatter([*shown[:4], hidden]) == 0.0, "too few"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio_std", [0.0, 0.01, 0.03])
 def test_mu_s_is_within_what_a_model_of_the_same_taps_says(ratio_std: float) -> None:
     """Slow taps, whose ratio scatters: where that was told as one number half of mu_s lay outside of 95 %."""

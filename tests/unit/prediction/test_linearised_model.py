@@ -10,6 +10,8 @@ from impactcell.prediction.capture_blocks import linearised_model
 from impactcell.prediction.linearised_model import DAMPING, STIFFNESS, parameters_of
 from tests.taps import Tap
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("place", [STIFFNESS, DAMPING])
 def test_parameters_beyond_any_number_are_a_fault_and_no_warning(place: int) -> None:

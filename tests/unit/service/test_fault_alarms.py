@@ -182,7 +182,7 @@ async def test_a_module_that_was_not_asked_yet_is_not_told_to_be_lost(task: Cell
     assert card["link_reason"]["en"] == task.health.reason
     assert "compiling for this machine" in task.health.reason
     assert "übersetzt für diese Maschine" in card["link_reason"]["de"]
-    task._module._report_link(connected=False, reason=SILENT)
+    task._module._account.disconnect(SILENT)
     assert feed.views[task.cell.name].card()["freshness"] == "lost"
     assert task.health.reason == SILENT
     task._publish_restored()  # begun anew after a fault

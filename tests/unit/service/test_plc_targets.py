@@ -132,6 +132,7 @@ async def test_a_target_that_was_withdrawn_while_the_module_executed_a_tap_is_no
     assert [outcome.target_m for outcome in task.outcomes] == [0.006]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("by_plc", [True, False])
 async def test_no_tap_is_made_for_a_target_once_the_module_shows_another(
     module: ToldModule, task: PositioningTask, by_plc: bool

@@ -292,6 +292,7 @@ def test_serves_until_it_is_told_to_stop(tmp_path: Path, how: signal.Signals, co
     assert lines[0]["mu_s"] == pytest.approx(0.2, rel=0.05)
 
 
+@pytest.mark.slow
 def test_it_ends_with_its_parent_where_asked_to(tmp_path: Path) -> None:
     scenario = (CONFIG / "sim" / "demo.yaml").read_text().replace("../maps", str(CONFIG / "maps"))
     (tmp_path / "s.yaml").write_text(scenario)

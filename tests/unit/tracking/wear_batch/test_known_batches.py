@@ -191,6 +191,7 @@ def test_a_filter_that_an_earlier_version_began_with_a_late_cycle_stays_as_it_is
         assert result.used
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [10, 20])
 @pytest.mark.parametrize("first", [1, 2])
 def test_a_first_batch_of_one_or_two_cycles_gives_away_nothing_of_the_step(first, step):
