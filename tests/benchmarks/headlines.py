@@ -113,10 +113,10 @@ HEADLINES: tuple[tuple[str, Mapping[str, Cell]], ...] = (
         },
     ),
     (
-        "**Keep.** The service killed at {moments} random moments: cycles lost of 2409: {lost}.",
+        "**Keep.** The service killed at {moments} random moments: cycles lost of 755: {lost}.",
         {
             "moments": Cell(RESULTS, "crashes", "`kill -9` at random moments", "bar"),
-            "lost": Cell(RESULTS, "crashes", "cycles lost, of 2409", "measured"),
+            "lost": Cell(RESULTS, "crashes", "cycles lost, of 755", "measured"),
         },
     ),
 )
