@@ -9,6 +9,7 @@ import numpy as np
 
 from impactcell.errors import CaptureError, ImpactCellError, PhysicsError
 from impactcell.records import MM_PER_MIN, Samples
+from impactcell.records.plausible_range import meant_in
 
 FASTEST_M_S: Final = 10.0
 """Beyond it nothing is an actuator's velocity: ten times that of the fastest drives. Our choice."""
@@ -26,9 +27,7 @@ def check_fastest(velocity_m_s: float, error: type[ImpactCellError]) -> None:
     """
     if not velocity_m_s > FASTEST_M_S:
         return
-    units = {"mm/min": velocity_m_s * MM_PER_MIN, "mm/s": velocity_m_s * 1e-3}
-    meant = next((unit for unit, speed in units.items() if USUAL_M_S[0] <= speed <= USUAL_M_S[1]), None)
-    way_out = f"if that was meant in {meant}, give {units[meant]:.6g}" if meant else "check its unit"
+    way_out = meant_in(velocity_m_s, {"mm/min": MM_PER_MIN, "mm/s": 1e-3}, USUAL_M_S) or "check its unit"
     raise error(
         f"velocity_m_s = {velocity_m_s:g}: no actuator taps faster than {FASTEST_M_S:g} m/s; {way_out}"
     )

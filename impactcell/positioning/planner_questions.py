@@ -6,6 +6,7 @@ from impactcell.errors import PositioningError
 from impactcell.positioning.planner_posterior import PlannerPosterior
 from impactcell.positioning.tap import Tap
 from impactcell.records import Signature
+from impactcell.records.plausible_range import meant_in
 
 FURTHEST_M = 10.0
 """Further from the origin of its axis, or from its target, no part of a cell lies: mm have been given."""
@@ -97,12 +98,10 @@ def check_observation(tap: Tap, moved_m: float, mass_kg: float, slowing_m_s2: fl
     stroke_m = tap.stroke_m if tap.stroke_m < math.inf else LONGEST_M
     furthest_m = FURTHER * tap.velocity_m_s**2 / (2.0 * slowing_m_s2) + stroke_m
     if moved_m > furthest_m:
-        units = {"mm": 1e-3 * moved_m, "µm": 1e-6 * moved_m}
-        meant = next((unit for unit, moved in units.items() if moved <= furthest_m), None)
+        way_out = meant_in(moved_m, {"mm": 1e-3, "µm": 1e-6}, (0.0, furthest_m))
         raise PositioningError(
             f"cannot learn from a displacement of {moved_m:g} m, where no tap at {tap.velocity_m_s:.3g} m/s "
-            f"moves a part by more than {furthest_m:.2g} m"
-            + (f"; if that was meant in {meant}, give {units[meant]:.6g}" if meant else "")
+            f"moves a part by more than {furthest_m:.2g} m" + (way_out and f"; {way_out}")
         )
 
 
@@ -192,8 +191,8 @@ def check_sensor(position_noise_m: float) -> None:
     """
     if not (is_positive(position_noise_m) and position_noise_m <= NOISIEST_M):
         raise PositioningError(
-            f"tap planner: position_noise_m lies between 0 and {NOISIEST_M:g} m, not {position_noise_m}; "
-            "it is in metres"
+            f"tap planner: position_noise_m lies between 0 and {NOISIEST_M:g} m, not "
+            f"{shown(position_noise_m)}; it is in metres"
         )
 
 

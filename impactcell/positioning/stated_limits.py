@@ -11,6 +11,7 @@ from impactcell.errors import PositioningError
 from impactcell.numerics.raster import Raster
 from impactcell.positioning.planner_questions import FURTHEST_M, is_number, is_positive, shown
 from impactcell.records import MM_PER_MIN
+from impactcell.records.plausible_range import meant_in
 
 
 class Limit(NamedTuple):
@@ -57,13 +58,7 @@ def check_limit(name: str, value: float) -> None:
     if not is_positive(value):
         raise PositioningError(f"tap planner: {name} must be positive, not {shown(value)}")
     if value > limit.largest:
-        low, high = limit.usual
-        meant = next((unit for unit, one in limit.units.items() if low <= one * value <= high), None)
-        way_out = (
-            f"if that was meant in {meant}, give {limit.units[meant] * value:.6g}"
-            if meant
-            else "see its unit"
-        )
+        way_out = meant_in(value, limit.units, limit.usual) or "see its unit"
         raise PositioningError(
             f"tap planner: {name} is {value:g}, where no cell has more than {limit.largest:g}; {way_out}"
         )

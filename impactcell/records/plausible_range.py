@@ -6,6 +6,26 @@ from dataclasses import dataclass
 from typing import Final
 
 
+def meant_in(value: float, units: Mapping[str, float], usual: tuple[float, float], verb: str = "give") -> str:
+    """Say in which other unit a number was meant, and what to give then; empty where it is usual in none.
+
+    Parameters
+    ----------
+    units : mapping
+        By what one of them is in the unit that is asked for; the first that makes the number usual is told.
+    usual : tuple of float
+        Where it lies, in that unit.
+
+    Examples
+    --------
+    >>> meant_in(40.0, {"mm/s": 1e-3}, (1e-3, 1.0))
+    'if that was meant in mm/s, give 0.04'
+    """
+    low, high = usual
+    meant = next((unit for unit, one in units.items() if low <= one * value <= high), None)
+    return f"if that was meant in {meant}, {verb} {units[meant] * value:g}" if meant else ""
+
+
 @dataclass(frozen=True, slots=True)
 class PlausibleRange:
     """Where a quantity of a tap lies, and what else it may have been said in.
@@ -33,11 +53,7 @@ class PlausibleRange:
         if self.low <= value <= self.high or not math.isfinite(value):
             return ""
         unit = f" {self.unit}" if self.unit else ""
-        way_out = "check its unit"
-        for other, factor in self.others.items():
-            if self.low <= factor * value <= self.high:
-                way_out = f"if that was meant in {other}, write {factor * value:g}"
-                break
+        way_out = meant_in(value, self.others, (self.low, self.high), "write") or "check its unit"
         return (
             f"{self.name} of {value:g}{unit} is hardly meant, where {self.of} have {self.low:g} to "
             f"{self.high:g}{unit}: {way_out}"

@@ -17,6 +17,7 @@ differentiate, and have no term.
 
 import math
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,18 +71,13 @@ def sindy(problem: Problem, nominal: Fit, library: tuple[str, ...]) -> list[list
     k, b, _, mu = (
         float(one) for one in problem.with_effects(nominal.effects).plant_parameters(nominal.theta)[:4]
     )
-    phase = sample_phases(problem, trajectory_of(problem, nominal))
     force = problem.shots.values[problem.shots.channel == FORCE]
     peak = float(force.max(initial=0.0))
     span = max(float(np.max(np.abs(shot.values[POSITION]))) for shot in problem.shots.items)
     slides, contacts, momenta, speeds = [], [], [], []
-    for number, shot in enumerate(problem.shots.items):
-        part = problem.shots.samples_of(number)
-        mine = phase[part][problem.shots.channel[part] == POSITION]
-        slow = smoothed(problem, shot, mine == FREE_SLIDE, SMOOTH_SLIDE_S)
+    for shot, slow, fast in smoothed_shots(problem, nominal):
         if slow is not None:
             slides.append(slide(problem, shot, slow, mu, span))
-        fast = smoothed(problem, shot, (mine == LOADING) | (mine == UNLOADING), SMOOTH_CONTACT_S)
         if fast is not None and len(shot.times[FORCE]):
             contacts.append(contact(fast, k, b, peak))
             momenta.append(momentum(problem, shot, fast, mu))
@@ -96,6 +92,22 @@ def sindy(problem: Problem, nominal: Fit, library: tuple[str, ...]) -> list[list
             if group and group not in found:
                 found.append(group)
     return found
+
+
+def smoothed_shots(
+    problem: Problem, nominal: Fit
+) -> Iterator[tuple[PreparedShot, Smoothed | None, Smoothed | None]]:
+    """Smooth the free slide and the contact of every shot, by the phases of the nominal model."""
+    phase = sample_phases(problem, trajectory_of(problem, nominal))
+    for number, shot in enumerate(problem.shots.items):
+        part = problem.shots.samples_of(number)
+        mine = phase[part][problem.shots.channel[part] == POSITION]
+        touching = (mine == LOADING) | (mine == UNLOADING)
+        yield (
+            shot,
+            smoothed(problem, shot, mine == FREE_SLIDE, SMOOTH_SLIDE_S),
+            smoothed(problem, shot, touching, SMOOTH_CONTACT_S),
+        )
 
 
 def smoothed(problem: Problem, shot: PreparedShot, on: np.ndarray, over_s: float) -> Smoothed | None:
@@ -211,7 +223,7 @@ def selected(shots: list[tuple[np.ndarray, Columns]]) -> list[str]:
     errors = np.array(
         [
             [
-                np.mean((y[fold == out] - columns[fold == out] @ _fitted(columns, y, fold != out, one)) ** 2)
+                np.mean((y[fold == out] - columns[fold == out] @ fitted(columns, y, fold != out, one)) ** 2)
                 for out in range(FOLDS)
             ]
             for one in THRESHOLDS
@@ -221,15 +233,17 @@ def selected(shots: list[tuple[np.ndarray, Columns]]) -> list[str]:
     best = int(np.argmin(mean))
     limit = mean[best] + errors[best].std(ddof=1) / math.sqrt(FOLDS)
     threshold = max(one for one, error in zip(THRESHOLDS, mean, strict=True) if error <= limit)
-    alive = _fitted(columns, y, np.ones(len(y), dtype=bool), threshold) != 0.0
+    alive = fitted(columns, y, np.ones(len(y), dtype=bool), threshold) != 0.0
     return list(dict.fromkeys(key[0] for key, one in zip(keys, alive, strict=True) if one))
 
 
-def _fitted(columns: np.ndarray, y: np.ndarray, on: np.ndarray, threshold: float) -> np.ndarray:
+def fitted(
+    columns: np.ndarray, y: np.ndarray, on: np.ndarray, threshold: float, ridge: float = RIDGE
+) -> np.ndarray:
     """Coefficients of a sparse regression by PySINDy's optimizer; it warns where none is left."""
     from pysindy import STLSQ
 
-    optimizer = STLSQ(threshold=threshold, alpha=RIDGE)
+    optimizer = STLSQ(threshold=threshold, alpha=ridge)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         optimizer.fit(columns[on], y[on][:, None])

@@ -24,8 +24,7 @@ from typing import Any
 import numpy as np
 
 from impactcell.discrepancy.data import shot_set
-from impactcell.discrepancy.data.phases import FREE_SLIDE, LOADING, UNLOADING
-from impactcell.discrepancy.data.prepared_shots import FORCE, POSITION
+from impactcell.discrepancy.data.prepared_shots import FORCE
 from impactcell.discrepancy.laws import LawFinding
 from impactcell.discrepancy.model import (
     Constraints,
@@ -33,8 +32,6 @@ from impactcell.discrepancy.model import (
     Problem,
     fit,
     refit_shot_parameters,
-    sample_phases,
-    trajectory_of,
 )
 from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.search import GapMeasure, Part
@@ -45,7 +42,7 @@ from impactcell.physics.bspline import spline_basis
 from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, Phase
 from impactcell.physics.effects import add_effect
 from impactcell.records import Samples
-from tests.benchmarks._discrepancy_sindy import SMOOTH_CONTACT_S, SMOOTH_SLIDE_S, smoothed
+from tests.benchmarks._discrepancy_sindy import fitted, smoothed_shots
 
 G = 9.81
 LEAST_SPEED = 0.1
@@ -206,12 +203,8 @@ def plant_numbers(problem: Problem, nominal: Fit) -> list[float]:
 def residual_rows(problem: Problem, nominal: Fit) -> tuple[Slide, Contact]:
     """What the nominal model leaves of the smoothed training shots."""
     k, b, _, mu = plant_numbers(problem, nominal)
-    phase = sample_phases(problem, trajectory_of(problem, nominal))
     slides, contacts = [], []
-    for number, shot in enumerate(problem.shots.items):
-        part = problem.shots.samples_of(number)
-        mine = phase[part][problem.shots.channel[part] == POSITION]
-        slow = smoothed(problem, shot, mine == FREE_SLIDE, SMOOTH_SLIDE_S)
+    for number, (shot, slow, fast) in enumerate(smoothed_shots(problem, nominal)):
         if slow is not None:
             on = slow.v > LEAST_SPEED * slow.v.max()
             # With the mean friction: a shot's own has taken up what differs between fast and slow ones.
@@ -223,7 +216,6 @@ def residual_rows(problem: Problem, nominal: Fit) -> tuple[Slide, Contact]:
                     shot.mass_kg * same, shot.mass_kg * slow.a[on] + friction, number * same,
                 )
             )  # fmt: skip
-        fast = smoothed(problem, shot, (mine == LOADING) | (mine == UNLOADING), SMOOTH_CONTACT_S)
         if fast is not None and len(shot.times[FORCE]):
             on = fast.travel > fast.x
             d, rate = (fast.travel - fast.x)[on], (fast.travel_rate - fast.v)[on]
@@ -334,8 +326,6 @@ def gaussian_process(rows: Rows, seed: int) -> Predict:
 
 def sindy(rows: Rows, _seed: int) -> Predict:
     """Regress on many terms; threshold and ridge are those that predict left-out shots best."""
-    from pysindy import STLSQ
-
     inputs, left, shot = rows
     library = _slide_library if inputs.shape[1] == 4 else _contact_library
     ends = np.array([inputs.min(0), inputs.max(0)])
@@ -344,20 +334,15 @@ def sindy(rows: Rows, _seed: int) -> Predict:
     columns, y = columns / size, left / scale
     fold = np.unique(shot, return_inverse=True)[1] % FOLDS
 
-    def fitted(on: Samples, threshold: float, ridge: float) -> Samples:
-        optimizer = STLSQ(threshold=threshold, alpha=ridge)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            optimizer.fit(columns[on], y[on][:, None])
-        return np.asarray(optimizer.coef_)[0]
-
     def missed(settings: tuple[float, float]) -> float:
-        return sum(
-            float(np.sum((y[fold == out] - columns[fold == out] @ fitted(fold != out, *settings)) ** 2))
-            for out in range(FOLDS)
-        )
+        total = 0.0
+        for out in range(FOLDS):
+            left_out = fold == out
+            weights = fitted(columns, y, ~left_out, *settings)
+            total += float(np.sum((y[left_out] - columns[left_out] @ weights) ** 2))
+        return total
 
-    weights = fitted(np.ones(len(y), dtype=bool), *min(product(THRESHOLDS, RIDGES), key=missed))
+    weights = fitted(columns, y, np.ones(len(y), dtype=bool), *min(product(THRESHOLDS, RIDGES), key=missed))
     return lambda points: scale * (library(points, ends) / size) @ weights
 
 

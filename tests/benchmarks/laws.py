@@ -168,8 +168,8 @@ def rivals_table(rows: Sequence[Row]) -> list[Table]:
     def shares(values: Mapping[str, list[float]], limit: float) -> list[str]:
         return [f"{sum(one <= limit for one in of)}/{len(of)}" for of in values.values()]
 
-    def medians(values: Mapping[str, list[float]], form: str) -> list[str]:
-        return [form.format(float(np.median(of))) for of in values.values()]
+    def medians(values: Mapping[str, list[float]], form: str, unit: float = 1.0) -> list[str]:
+        return [form.format(float(np.median(of)) / unit) for of in values.values()]
 
     def behind(values: Mapping[str, list[float]]) -> list[str]:
         ours = values[""]
@@ -179,7 +179,7 @@ def rivals_table(rows: Sequence[Row]) -> list[Table]:
         ["held-out gap, median", *medians(gaps, "{:.2f}")],
         ["held-out gap at most 1.2", *shares(gaps, LARGEST_GAP)],
         ["a smaller gap than impactcell's", *behind(gaps)],
-        ["error of the force, median", *medians(errors, "{:.1%}")],
+        ["error of the force, median", *medians(errors, "{:.1f} %", 0.01)],
         ["error at most 5 % of its size", *shares(errors, LARGEST_ERROR)],
         ["a smaller error than impactcell's", *behind(errors)],
         ["processor time, median [s]", *medians(seconds, "{:.1f}")],

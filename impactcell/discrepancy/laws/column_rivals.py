@@ -41,7 +41,7 @@ from impactcell.records import Samples
 
 STRAIGHT = 1e6
 """Weight of the roughness, over what the data know of the coefficients, at which a spline is a straight line:
-at 1 it bends with the scatter of some thirty shots, and takes an eighth of them for itself."""
+at 1 it has five numbers, and bends with the scatter of some thirty shots."""
 SAME = 1e-9
 """Share of a pattern that others leave up to which it is one of them but for rounding."""
 

@@ -60,8 +60,9 @@ class Constraints:
 
     def hold(self, names: tuple[str, ...], values: Samples) -> Samples:
         """Parameter vector of `names` with what is held at its value."""
-        for place, name in enumerate(names) if self.held else ():
-            values[place] = self.held.get(name, values[place])
+        for place, name in enumerate(names):
+            if name in self.held:
+                values[place] = self.held[name]
         return values
 
     def penalty(self, coordinates: tuple[Coordinate, ...]) -> Samples:

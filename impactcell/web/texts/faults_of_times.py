@@ -36,12 +36,12 @@ FAULTS_OF_TIMES: Final = (
         + ROUNDED_GERMAN,
     ),
     FaultPattern(
-        r"no column of time was found(?P<why>.*); name it with --column .*",
+        r"no column of time was found(?P<why>.*?)(?:, as --unit '.*')?; name it with --column .*",
         "no column of time was found{why}; choose it in the form below, or give the sampling rate there",
         "keine Zeitspalte gefunden{why}; unten im Formular wählen, oder dort die Abtastrate angeben",
     ),
     FaultPattern(
-        r"has no column of time(?P<why>.*); name it, .*",
+        r"has no column of time(?P<why>.*?)(?:, as --unit '.*')?; name it, .*",
         "has no column of time{why}; choose it in the form below, or give the sampling rate there",
         "hat keine Zeitspalte{why}; unten im Formular wählen, oder dort die Abtastrate angeben",
     ),

@@ -260,8 +260,6 @@ def page_fault(fault: str, language: str) -> tuple[str, str]:
         if match is None:
             continue
         said = {name: text or "" for name, text in match.groupdict().items()}
-        if "why" in said:
-            said["why"] = re.sub(", as --unit '.*'$", "", said["why"])
         if language == "de":
             said |= _in_german(said)
         return language, said["place"] + (kind.german if language == "de" else kind.english).format_map(said)
