@@ -112,7 +112,9 @@ def test_motion_that_counts_as_noise_is_no_reason_to_say_that_nothing_is_missing
         for shot in oscillations(CUBIC, 0.8)
         if shot.force and shot.position
     )
-    assert investigate_machine(Campaign(Excitation.DRIVEN, stated), base).verdict == "no_gap"
+    hidden = investigate_machine(Campaign(Excitation.DRIVEN, stated), base)
+    assert hidden.verdict == "untested"
+    assert [one.name for one in hidden.clear_strengths] == ["hardening_spring"]
 
 
 def record(values: np.ndarray, force: np.ndarray, noise: float = 1.0) -> UniformRecord:

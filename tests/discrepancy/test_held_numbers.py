@@ -193,7 +193,12 @@ def test_a_zero_of_the_force_that_is_held_is_told_and_is_no_law() -> None:
 def test_a_late_force_is_told_and_is_no_law_of_the_speed() -> None:
     finding = investigate_machine(slide(late_s=6e-3), SLIDE)
     assert finding.established == ()
-    assert any(note.startswith("A force recorded 6 ms late would explain") for note in finding.notes)
+    [late_ms] = [
+        float(told[1])
+        for note in finding.notes
+        if (told := re.match(r"A force recorded (\S+) ms late would explain", note))
+    ]
+    assert late_ms == pytest.approx(6.0, rel=0.03)
     assert finding.law is None
     way_out = "delay_s: {std: SECONDS} among the nuisances of the base model would tell"
     assert way_out in finding.law_refused

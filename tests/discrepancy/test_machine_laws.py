@@ -129,7 +129,7 @@ def test_the_gap_that_is_told_for_a_law_is_that_of_its_file(tmp_path: Path) -> N
     finding = investigate_machine(campaign, base)
     law = finding.law
     assert law is not None
-    assert finding.final.delay_s == pytest.approx(-6e-4, abs=1e-4)
+    assert finding.final.delay_s < -1e-4
     assert law.model.delay_s == pytest.approx(0.0, abs=3e-5)
     assert law.fall.after < 1.2
     write_machine_findings(finding, campaign, tmp_path / "found", "slide")

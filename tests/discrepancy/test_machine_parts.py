@@ -38,7 +38,9 @@ def test_range_of_a_gap_where_nothing_is_left_is_students() -> None:
     model: Any = SimpleNamespace(fit=SimpleNamespace(columns=(), coefficients=np.empty(0)))
 
     def blocks(values: np.ndarray) -> Any:
-        return SimpleNamespace(losses=lambda *_: 2.0 * values, noise=np.full(len(values), 2.0))
+        return SimpleNamespace(
+            losses=lambda *_: 2.0 * values, noise=np.full(len(values), 2.0), largest_by_chance=1.3
+        )
 
     half = 2.776445 * squares.std(ddof=1) / squares.mean() / math.sqrt(5.0)
     expected = math.sqrt(1.0 - half) / 1.05, math.sqrt(1.0 + half) * 1.05
@@ -55,7 +57,10 @@ def test_a_model_is_at_the_floor_where_it_was_fitted_and_where_not(
     after: float, training: float, expected: bool
 ) -> None:
     found: Any = SimpleNamespace(
-        fall=SimpleNamespace(after=after), expected=(0.9, 1.1), train_gaps=(3.0, training)
+        fall=SimpleNamespace(after=after),
+        expected=(0.9, 1.1),
+        train_gaps=(3.0, training),
+        training=SimpleNamespace(largest_by_chance=1.3),
     )
     assert machine_finding.MachineFinding.is_at_floor.fget(found) is expected  # type: ignore[attr-defined]
 

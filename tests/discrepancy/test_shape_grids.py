@@ -61,4 +61,5 @@ def test_presliding_is_named_whatever_its_length(share: float, stroke_m: float) 
     found = investigate_machine(slide(presliding, SEED), SLIDE)
     assert found.established == ("presliding_hysteresis",)
     assert found.fall.after < 1.0 < found.fall.before
-    assert found.final.terms[-1].shape == pytest.approx(share * stroke_m, rel=0.1)
+    low, high = found.final.shape_intervals["presliding_hysteresis"]
+    assert low < share * stroke_m < high < 1.6 * low

@@ -1,12 +1,8 @@
 """Any machine with one coordinate: a base model without a cell, and what its records say it lacks."""
 
 from impactcell.discrepancy.machine.base_model import BaseModel, LawForm, NumberPrior, Response, TermChoice
-from impactcell.discrepancy.machine.finding import (
-    FallOfGap,
-    FittedModel,
-    MachineFinding,
-    MachineLaw,
-)
+from impactcell.discrepancy.machine.evidence import FallOfGap
+from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, MachineLaw
 from impactcell.discrepancy.machine.held_out_stretch import drifts
 from impactcell.discrepancy.machine.investigation import investigate_machine
 from impactcell.discrepancy.machine.law_terms import LAW_PLACES, term_of

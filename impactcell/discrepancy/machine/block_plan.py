@@ -6,7 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from impactcell.discrepancy.machine.held_out_stretch import between_gaps
-from impactcell.discrepancy.machine.regression import BLOCKS_OF_RECORD, Blocks, blocks_of
+from impactcell.discrepancy.machine.regression import (
+    BLOCKS_OF_RECORD,
+    PIECES_PER_BLOCK,
+    Blocks,
+    blocks_of,
+)
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import IndexArray, Rows
 
@@ -25,10 +30,13 @@ class BlockPlan:
     block_s : float
     held : set of int or None
         Places of the records that are held out; None for the last third of each.
+    pieces_each : float
+        Independent pieces that a block counts for.
     """
 
     block_s: float
     held: set[int] | None
+    pieces_each: float = PIECES_PER_BLOCK
 
     def number(self, rows: Rows) -> IndexArray:
         """Block of each row, shape (n,)."""
@@ -54,7 +62,9 @@ class BlockPlan:
             fold = {block: records.index(block // BLOCKS_OF_RECORD) for block in fitted}
         else:
             fold = {block: place * FOLDS // len(fitted) for place, block in enumerate(fitted)}
-        return blocks_of(rows, number, fold), blocks_of(rows, number, dict.fromkeys(held, 0))
+        parts = fold, dict.fromkeys(held, 0)
+        training, held_out = (blocks_of(rows, number, part, self.pieces_each) for part in parts)
+        return training, held_out
 
     def held_spans(
         self, rows: Rows, records: Sequence[UniformRecord]

@@ -1,4 +1,4 @@
-"""95 % intervals of a regression by the scatter of its residuals between blocks.
+"""Intervals of a regression by the scatter of its residuals between blocks.
 
 Blocks that tell a number have a part in what was fitted, and leave too little: each block's scores are made
 larger for that, which is unbiased where all scatter alike (Bell and McCaffrey 2002, CR2). Where few blocks
@@ -15,8 +15,8 @@ OWN_AT_MOST = 1.0 - 1e-6
 """Share of what is known of a number that one block may hold by itself [1]."""
 
 
-def half_intervals(grams: Samples, scores: Samples, matrix: Samples) -> Samples:
-    """Half of the 95 % interval of each coefficient, shape (p,).
+def half_intervals(grams: Samples, scores: Samples, matrix: Samples, level: float = 0.95) -> Samples:
+    """Half of the interval of each coefficient, shape (p,).
 
     Parameters
     ----------
@@ -26,6 +26,8 @@ def half_intervals(grams: Samples, scores: Samples, matrix: Samples) -> Samples:
         Sums of products of the columns and what is left of the target.
     matrix : ndarray, shape (p, p)
         Normal equations: the sum of `grams`, with what is known beforehand.
+    level : float
+        Probability that an interval covers [1].
     """
     size = np.sqrt(np.where(np.diag(matrix) > 0.0, np.diag(matrix), 1.0))
     values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
@@ -46,5 +48,5 @@ def half_intervals(grams: Samples, scores: Samples, matrix: Samples) -> Samples:
     crossed = np.swapaxes(common, 1, 2) @ common
     spread = np.sum(own**2 - 2.0 * own * squares, axis=1) + np.sum(crossed**2, axis=(1, 2))
     freedom = np.maximum(trace**2 / np.maximum(spread, np.finfo(float).tiny), 1.0)
-    half: Samples = student.ppf(0.975, freedom) * np.sqrt(variance)
+    half: Samples = student.ppf(0.5 + 0.5 * level, freedom) * np.sqrt(variance)
     return half

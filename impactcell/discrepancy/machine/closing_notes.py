@@ -35,7 +35,7 @@ def with_closing_notes(fits: MachineFits, finding: MachineFinding) -> MachineFin
     notes = [*finding.notes, *_note_of_delay(finding)]
     if fits.held is None:
         notes += _note_of_rest(finding)
-    if better is not None:
+    if better is not None and not finding.clear_strengths:  # where these say it
         sensor = COLUMNS[finding.base.coordinate]["position_noise"]
         notes.append(
             f"{enumerated([*map(in_words, better.names)], 'or')}: blocks do not show it, but simulated open "
@@ -78,6 +78,9 @@ def _tried(fits: MachineFits, finding: MachineFinding) -> list[ChosenTerm]:
     step_s = min(record.step_s for record in finding.records)
     steps = longest_s / min(step_s, finding.scale.period_s / STEPS_PER_PERIOD)
     most = max(int(MOST_STEPS / steps), LEAST_TRIED)
+    if not finding.missing_blocks and finding.is_at_floor:  # any term may help a gravity that is a little off
+        clear = {one.name for one in finding.clear_strengths}
+        terms = [term for term in terms if term.choice.name in clear]
     return [term for term in terms if not term.choice.covariate][:most]
 
 

@@ -6,13 +6,14 @@ from dataclasses import replace
 from itertools import takewhile
 
 from impactcell.discrepancy.machine.base_model import TermChoice
+from impactcell.discrepancy.machine.evidence import FallOfGap
 from impactcell.discrepancy.machine.explained_by_numbers import (
     absent_gravity_notes,
     blamed_on_number,
     explained_by,
     held_number_notes,
 )
-from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel, MachineFinding
+from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
 from impactcell.discrepancy.machine.held_numbers import numbers_held, told_from_number
 from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine, machine_parts
 from impactcell.discrepancy.machine.machine_fits import MachineFits

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from impactcell.discrepancy.data import MIN_HELD_OUT, MIN_TRAINING
 from impactcell.discrepancy.laws import FittedFunction
 from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
+from impactcell.discrepancy.machine.evidence import ClearStrength, FallOfGap
 from impactcell.discrepancy.machine.law_terms import listed_term
 from impactcell.discrepancy.machine.motion_scale import MotionScale
 from impactcell.discrepancy.machine.open_loop_error import BetterSimulation, OpenLoopError
@@ -14,42 +15,13 @@ from impactcell.discrepancy.machine.selection import SelectionStep
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import Column
-from impactcell.discrepancy.search import MAX_EXPECTED_GAP, MAX_P_VALUE, MIN_CLOSED_SHARE, Proposal
+from impactcell.discrepancy.search import Proposal
 from impactcell.german.open_loop import POOR_FIT_PERCENT
 
 LEAST_GAP = 0.5
 """Gap below which the noise is less than half of what it was taken for [1]."""
 FAR_ABOVE_NOISE = 2.0
 """Error of a simulated position over the sensor's noise from which on it is no noise [1]."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FallOfGap:
-    """Held-out gap with and without a term, 1 = noise floor.
-
-    Attributes
-    ----------
-    before, after : float
-    closed, low, high : float
-        Share of the gap above the floor that is closed, and its 95 % interval over blocks.
-    p_value : float
-    """
-
-    before: float
-    after: float
-    closed: float
-    low: float
-    high: float
-    p_value: float
-
-    @property
-    def is_real(self) -> bool:
-        """Whether held-out blocks confirm it."""
-        return self.is_real_among(1)
-
-    def is_real_among(self, tests: int) -> bool:
-        """Whether held-out blocks confirm it where so many tests share the error of one (Bonferroni)."""
-        return self.low > 0.0 and self.closed >= MIN_CLOSED_SHARE and self.p_value <= MAX_P_VALUE / tests
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -200,6 +172,8 @@ class MachineFinding:
         Of the held-out simulation, by the nominal and by the final model; empty until it was done.
     better_simulated : BetterSimulation or None
         Where nothing is established, a term that held-out blocks do not show and their simulation does.
+    clear_strengths : tuple of ClearStrength
+        Where nothing is established and the gap is at its floor, the clearest first.
     """
 
     base: BaseModel
@@ -226,6 +200,7 @@ class MachineFinding:
     experiments: tuple[Proposal, ...] = ()
     simulated: tuple[OpenLoopError, ...] = ()
     better_simulated: BetterSimulation | None = None
+    clear_strengths: tuple[ClearStrength, ...] = ()
 
     @staticmethod
     def enough(training: Blocks, held_out: Blocks) -> bool:
@@ -240,7 +215,7 @@ class MachineFinding:
     @property
     def is_at_floor(self) -> bool:
         """Whether the final model leaves nothing."""
-        return self.fall.after <= self.expected[1] and self.train_gaps[1] <= MAX_EXPECTED_GAP
+        return self.fall.after <= self.expected[1] and self.train_gaps[1] <= self.training.largest_by_chance
 
     @property
     def is_driven(self) -> bool:
@@ -288,6 +263,6 @@ class MachineFinding:
             return "untested"
         if self.established:
             return "tied" if any(self.tied_with.values()) else "named"
-        if self.noise_is_motion or self.noise_hides:
+        if self.noise_is_motion or self.noise_hides or self.clear_strengths:
             return "untested"
         return "no_gap" if self.is_at_floor else "unknown"

@@ -10,7 +10,6 @@ from impactcell.discrepancy.laws import BAND, DRAWN, FittedFunction, Tangent
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.regression import (
-    PIECES_PER_BLOCK,
     Blocks,
     prior_weight,
     roughness_penalty,
@@ -114,7 +113,7 @@ def tangent_of(
 ) -> tuple[Tangent, float]:
     """Quadratic log-likelihood of the spline's coefficients, and the variance that it is over.
 
-    What is left scatters by blocks: a block counts as `PIECES_PER_BLOCK` independent pieces.
+    What is left scatters by blocks: a block counts as so many independent pieces.
     """
     fit = model.fit
     count = len(spline.columns)
@@ -122,8 +121,7 @@ def tangent_of(
     inside = blocks.places(spline.columns)
     beside = blocks.places([fit.columns[place] for place in own])
     total = blocks.products.sum(axis=0)
-    pieces = PIECES_PER_BLOCK * len(blocks)
-    variance = float(blocks.losses(fit.columns, fit.coefficients).sum()) / pieces
+    variance = float(blocks.losses(fit.columns, fit.coefficients).sum()) / blocks.pieces
     weight = prior_weight(blocks, fit.columns[:-count], fit.coefficients[:-count], fits.priors)
     matrix = total[np.ix_(beside, beside)] + np.diag(weight[own])
     held = [place for place in range(len(fit.columns) - count) if fit.at_bound[place]]
@@ -137,7 +135,7 @@ def tangent_of(
         information / variance,
         pull / variance,
         *tested,
-        samples=int(pieces),
+        samples=int(blocks.pieces),
         constant=False,
         fitted=fit.coefficients[-count:],
         others=np.zeros(0),

@@ -9,6 +9,7 @@ import numpy as np
 
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
+from impactcell.discrepancy.machine.clear_strengths import with_clear_strengths
 from impactcell.discrepancy.machine.closing_notes import with_closing_notes
 from impactcell.discrepancy.machine.column_slips import slip_in_columns, told_of_slip, with_degrees_asked_for
 from impactcell.discrepancy.machine.establishing import establish
@@ -90,7 +91,7 @@ def investigate_machine(
     if slip is not None:
         return told_of_slip(fits, finding, slip, notes)
     finding = with_experiments(fits, with_degrees_asked_for(with_law(fits, finding)))
-    return with_closing_notes(fits, finding)
+    return with_closing_notes(fits, with_clear_strengths(fits, finding))
 
 
 def _established(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:

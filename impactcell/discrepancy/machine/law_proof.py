@@ -3,7 +3,8 @@
 from dataclasses import replace
 
 from impactcell.discrepancy.machine.base_model import TermChoice
-from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel
+from impactcell.discrepancy.machine.evidence import FallOfGap
+from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.proof import fall_of_gap
 from impactcell.discrepancy.machine.trials import ChosenTerm

@@ -15,7 +15,7 @@ from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.held_number import DELAY, HeldNumber
 from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.model_forces import friction_at_rest
-from impactcell.discrepancy.machine.motion_scale import motion_scale
+from impactcell.discrepancy.machine.motion_scale import motion_scale, widening
 from impactcell.discrepancy.machine.nuisance_priors import nuisance_priors
 from impactcell.discrepancy.machine.record_constants import without_constants
 from impactcell.discrepancy.machine.regression import (
@@ -75,7 +75,7 @@ class MachineFits:
         self.held = held
         self.scale = motion_scale(records, base.response, base.gravity_torque.value)
         self.block_s = base.block_s if math.isfinite(base.block_s) else self.scale.period_s
-        self.plan = BlockPlan(self.block_s, held)
+        self.plan = BlockPlan(self.block_s, held, PIECES_PER_BLOCK / widening(records, self.scale))
         self.gravity = base.gravity_torque.value
         self.delay_s = base.delay_s.value
         self.priors = nuisance_priors(base, self.gravity)
@@ -147,7 +147,7 @@ class MachineFits:
         rows = self.rows_with(choices, smooth_force_columns)
         training, _ = self.blocks(rows.only(()))
         chosen = self.plan.rows_of(rows, training)
-        return SmoothForce(rows, chosen, len(training), self.priors, self.nonnegative)
+        return SmoothForce(rows, chosen, training.pieces, self.priors, self.nonnegative)
 
     def columns(self, terms: Iterable[ChosenTerm]) -> list[Column]:
         """Columns of a model: its free nuisances and its terms."""
@@ -191,7 +191,7 @@ class MachineFits:
             training, _ = self.blocks(self.prepared(rows))
             fit = fit_blocks(training, columns, self.priors, self.nonnegative)
             squares = float(training.losses(fit.columns, fit.coefficients).sum())
-            piece = squares / (PIECES_PER_BLOCK * len(training))
+            piece = squares / training.pieces
             return squares + piece * ((delay - prior.value) / prior.std) ** 2
 
         tried = prior.value + prior.std * np.linspace(-PRIOR_REACH, PRIOR_REACH, DELAY_STEPS)

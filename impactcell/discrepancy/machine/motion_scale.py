@@ -9,13 +9,20 @@ from numpy.typing import NDArray
 
 from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.channel_values import LARGEST
-from impactcell.discrepancy.machine.smoothing import second_difference, smoothed_acceleration
+from impactcell.discrepancy.machine.smoothing import second_difference, smoothed_acceleration, test_function
 from impactcell.discrepancy.machine.uniform_records import MIN_HALF_SUPPORT, UniformRecord
 from impactcell.errors import CampaignError
 from impactcell.records import Samples
 
 PERIODS_PER_SUPPORT = 0.25
 """Support of a test function over the period of the motion: a half swing has four rows [1]."""
+MOST_PERIODS_PER_SUPPORT = 1.0
+"""And at most, where noise wants it: two thirds of a sine are left then, a 32nd of white noise [1]."""
+MAX_ACCELERATION_NOISE = 0.003
+"""Noise of a row's acceleration over the largest one down to which supports are made wider where nothing
+drives, and a motion has no more than its period: what slows a bob is a hundredth of its weight [1]."""
+WIDER = math.sqrt(2.0)
+"""By how much at a time [1]."""
 SPEED_SUPPORT_SHARE = 0.25
 """Support by which a speed is smoothed at most, over that of a test function: direction turns fast [1]."""
 MIN_SPEED_SUPPORT = 3
@@ -180,13 +187,35 @@ def _inertial_force(records: Sequence[UniformRecord], period_s: float) -> float 
 
 def half_supports(record: UniformRecord, scale: MotionScale) -> tuple[int, int]:
     """Half support of a test function and of the smoothing of speeds [samples]."""
-    half = max(int(0.5 * PERIODS_PER_SUPPORT * scale.period_s / record.step_s), MIN_HALF_SUPPORT)
-    half = min(half, len(record.position) // 8)
+    half = min(_half_support(record, scale), len(record.position) // 8)
     widest = max(int(SPEED_SUPPORT_SHARE * half), MIN_SPEED_SUPPORT)
     narrow = MIN_SPEED_SUPPORT
     while narrow < widest and record.speed_noise(narrow) > MAX_SPEED_NOISE * scale.speed:
         narrow += 1
     return half, narrow
+
+
+def _half_support(record: UniformRecord, scale: MotionScale) -> int:
+    """Half of the least support at which a row's acceleration is quiet enough, or of the widest [samples]."""
+    largest = 2.0 * math.pi * scale.speed / scale.period_s
+    periods = PERIODS_PER_SUPPORT
+    while True:
+        half = max(int(0.5 * periods * scale.period_s / record.step_s), MIN_HALF_SUPPORT)
+        wider = WIDER * periods
+        if record.force.any() or wider > MOST_PERIODS_PER_SUPPORT * WIDER**0.5:
+            return half
+        _, curvature = test_function(half, record.step_s)
+        noise = record.noise[0] * math.sqrt(record.noise_gain(curvature))
+        if noise <= MAX_ACCELERATION_NOISE * largest:
+            return half
+        periods = wider
+
+
+def widening(records: Sequence[UniformRecord], scale: MotionScale) -> float:
+    """Mean of the supports over what they are where no noise makes them wider [1]."""
+    least = 0.5 * PERIODS_PER_SUPPORT * scale.period_s
+    wider = [half_supports(record, scale)[0] * record.step_s / least for record in records]
+    return max(sum(wider) / len(wider), 1.0)
 
 
 def is_told(record: UniformRecord, scale: MotionScale) -> NDArray[np.bool_]:

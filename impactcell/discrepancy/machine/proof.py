@@ -5,9 +5,10 @@ import math
 import numpy as np
 from scipy.stats import t as student
 
-from impactcell.discrepancy.machine.finding import FallOfGap, FittedModel
+from impactcell.discrepancy.machine.evidence import FallOfGap
+from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.regression import Blocks
-from impactcell.discrepancy.search import MAX_EXPECTED_GAP, MIN_OPEN_GAP
+from impactcell.discrepancy.search import MIN_OPEN_GAP
 from impactcell.records import Samples
 
 CLOSED_RESAMPLES = 999
@@ -65,7 +66,7 @@ def expected_gap(blocks: Blocks, model: FittedModel) -> tuple[float, float]:
     losses = blocks.losses(model.fit.columns, model.fit.coefficients)
     ratio = losses / np.maximum(blocks.noise, 1e-300)
     if len(ratio) < 2:
-        return 0.0, MAX_EXPECTED_GAP
+        return 0.0, blocks.largest_by_chance
     error = float(ratio.std(ddof=1) / max(ratio.mean(), 1e-300)) / math.sqrt(len(ratio))
     half = float(student.ppf(0.975, len(ratio) - 1)) * error
-    return math.sqrt(max(1.0 - half, 0.0)) / 1.05, min(math.sqrt(1.0 + half) * 1.05, MAX_EXPECTED_GAP)
+    return math.sqrt(max(1.0 - half, 0.0)) / 1.05, min(math.sqrt(1.0 + half) * 1.05, blocks.largest_by_chance)

@@ -2,14 +2,16 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.stats import chi2
 
 from impactcell.discrepancy.machine.base_model import PRIOR_REACH, NumberPrior
 from impactcell.discrepancy.machine.block_scatter import half_intervals
 from impactcell.discrepancy.machine.weak_form import Column, IndexArray, Rows
+from impactcell.discrepancy.search import MAX_EXPECTED_GAP
 from impactcell.records import Samples
 
 RIDGE = 1e-9
@@ -18,7 +20,7 @@ SIZE_WEIGHT = 1e-6
 """Weight of the size of a free function, over the information that blocks have of its pieces: what no block
 sees of it stays at zero [1]."""
 PIECES_PER_BLOCK = 4.0
-"""Independent pieces that a block counts for where a prior is weighed against it [1]."""
+"""Independent pieces that a block counts for, of a period and with supports of a quarter of it [1]."""
 BLOCKS_OF_RECORD = 100_000
 """Numbers of blocks that a record may have: a day of seconds [1]."""
 
@@ -39,6 +41,8 @@ class Blocks:
         Cross-validation leaves out one fold at a time.
     number : ndarray of int, shape (b,)
         Which blocks they are.
+    pieces_each : float
+        Independent pieces that one counts for, where a prior or chance is weighed against it.
     """
 
     names: tuple[Column, ...]
@@ -47,6 +51,7 @@ class Blocks:
     noise: Samples
     fold: IndexArray
     number: IndexArray
+    pieces_each: float = PIECES_PER_BLOCK
 
     @cached_property
     def without_folds(self) -> Samples:
@@ -57,6 +62,28 @@ class Blocks:
     def __len__(self) -> int:
         """Count the blocks."""
         return len(self.rows)
+
+    def beside(self, other: "Blocks") -> "Blocks":
+        """Take these blocks and others of the same columns together."""
+        return replace(
+            self,
+            products=np.concatenate([self.products, other.products]),
+            rows=np.concatenate([self.rows, other.rows]),
+            noise=np.concatenate([self.noise, other.noise]),
+            fold=np.concatenate([self.fold, other.fold]),
+            number=np.concatenate([self.number, other.number]),
+        )
+
+    @property
+    def pieces(self) -> float:
+        """Independent pieces of all of them."""
+        return self.pieces_each * len(self)
+
+    @property
+    def largest_by_chance(self) -> float:
+        """Largest gap that noise alone makes, once in forty: of few pieces a larger one than of many."""
+        pieces = max(self.pieces, 1.0)
+        return max(MAX_EXPECTED_GAP, math.sqrt(float(chi2.ppf(0.975, pieces)) / pieces))
 
     def places(self, columns: Iterable[Column]) -> list[int]:
         """Where columns stand in the matrices."""
@@ -93,7 +120,9 @@ class LinearFit:
     at_bound: Samples
 
 
-def blocks_of(rows: Rows, number: IndexArray, fold: Mapping[int, int]) -> Blocks:
+def blocks_of(
+    rows: Rows, number: IndexArray, fold: Mapping[int, int], pieces_each: float = PIECES_PER_BLOCK
+) -> Blocks:
     """Sum up each block's rows.
 
     Parameters
@@ -103,6 +132,8 @@ def blocks_of(rows: Rows, number: IndexArray, fold: Mapping[int, int]) -> Blocks
         Block of each row, with its record as the multiple of `BLOCKS_OF_RECORD`.
     fold : mapping
         Fold of each block that is wanted.
+    pieces_each : float
+        Independent pieces that a block counts for.
     """
     names = tuple(rows.columns)
     matrix = np.stack([*rows.columns.values(), rows.target], axis=1)
@@ -122,6 +153,7 @@ def blocks_of(rows: Rows, number: IndexArray, fold: Mapping[int, int]) -> Blocks
         np.array(noise),
         np.array([*fold.values()], dtype=np.int64),
         np.array([*fold], dtype=np.int64),
+        pieces_each,
     )
 
 
@@ -130,8 +162,9 @@ def fit_blocks(
     columns: Sequence[Column],
     priors: Mapping[Column, NumberPrior],
     nonnegative: frozenset[Column],
+    level: float = 0.95,
 ) -> LinearFit:
-    """Fit a model to blocks, with 95 % intervals by the scatter between them."""
+    """Fit a model to blocks, with intervals of so much probability by the scatter between them."""
     whole = blocks.products.sum(axis=0)
     coefficients, at_bound = _solve(blocks, (whole, len(blocks)), columns, priors, nonnegative)
     places = blocks.places(columns)
@@ -140,7 +173,7 @@ def fit_blocks(
     scores = blocks.products[:, places, last] - grams @ coefficients
     matrix = whole[np.ix_(places, places)] + np.diag(prior_weight(blocks, columns, coefficients, priors))
     matrix += RIDGE * np.diag(np.diag(matrix))
-    half = half_intervals(grams, scores, matrix)
+    half = half_intervals(grams, scores, matrix, level)
     low = lower_ends(columns, coefficients - half, nonnegative)
     return LinearFit(tuple(columns), coefficients, low, coefficients + half, at_bound)
 
@@ -215,7 +248,7 @@ def _solve(
             beside = right[free] - matrix[np.ix_(free, np.flatnonzero(held))] @ coefficients[held]
             coefficients[free] = _solved(matrix[np.ix_(free, free)], beside)
             left = max(total[-1, -1] - 2.0 * coefficients @ right + coefficients @ gram @ coefficients, 0.0)
-            weight = _weight(left / (PIECES_PER_BLOCK * count), columns, priors)
+            weight = _weight(left / (blocks.pieces_each * count), columns, priors)
         beyond = ~held & ((coefficients < lower) | (coefficients > upper))
         if not beyond.any():
             break
@@ -260,4 +293,4 @@ def prior_weight(
 ) -> Samples:
     """Weight of each column's prior against a model's squared residuals, shape (p,)."""
     left = float(blocks.losses(columns, coefficients).sum())
-    return _weight(left / (PIECES_PER_BLOCK * len(blocks)), columns, priors)
+    return _weight(left / blocks.pieces, columns, priors)

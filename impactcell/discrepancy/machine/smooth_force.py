@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from impactcell.discrepancy.machine.base_model import NumberPrior
-from impactcell.discrepancy.machine.regression import PIECES_PER_BLOCK, RIDGE
+from impactcell.discrepancy.machine.regression import RIDGE
 from impactcell.discrepancy.machine.rival_forms import Ranges, columns_of_corners
 from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.weak_form import Column, IndexArray, Rows
@@ -79,7 +79,7 @@ class SmoothForce:
     Rows r ~ N(X c, s² (V + k² P P')) with V the sensors' variances, P the waves by their spectrum, k the
     level, s at least 1, and c ~ N(0, s² D / s_0²), s_0 the s of the model that a term is put beside; k and
     the length are averaged over, s is of the largest likelihood, and what overlaps counts as
-    `PIECES_PER_BLOCK` independent rows a block.
+    fewer independent rows.
 
     Parameters
     ----------
@@ -87,8 +87,8 @@ class SmoothForce:
         With columns of `smooth_force_columns`, as they are fitted.
     chosen : ndarray of bool, shape (n,)
         Rows that count.
-    blocks : int
-        That these rows make.
+    pieces : float
+        Independent ones that these rows count for.
     priors : mapping
         Of the nuisances.
     nonnegative : frozenset of Column
@@ -99,11 +99,11 @@ class SmoothForce:
         self,
         rows: Rows,
         chosen: np.ndarray,
-        blocks: int,
+        pieces: float,
         priors: Mapping[Column, NumberPrior],
         nonnegative: frozenset[Column],
     ) -> None:
-        self._pieces = min(PIECES_PER_BLOCK * blocks, float(chosen.sum()))
+        self._pieces = min(pieces, float(chosen.sum()))
         sigma = np.sqrt(rows.variance[chosen] * chosen.sum() / self._pieces)
         names = [name for name in rows.columns if name[0] != NAME]
         waves = [name for name in rows.columns if name[0] == NAME]

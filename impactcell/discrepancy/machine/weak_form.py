@@ -1,8 +1,8 @@
 """Records as rows of a linear regression: the equation of motion in its weak form.
 
 With a test function w of compact support, `int w q'' dt = int w'' q dt`: no measured position is
-differentiated, and what is sampled fast and slowly averages in the same way. Each row is one place of w; two
-of them overlap by half.
+differentiated, and what is sampled fast and slowly averages in the same way. Each row is one place of w, a
+quarter of its support from the next one.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -38,6 +38,9 @@ TURNING_NOISES = 2.0
 KINK_SHARE = 0.08
 """Shift of a smoothed speed at a kink, over its change within the smoothing either side: 5/64 for a cubic's
 slope over many samples [1]."""
+ROWS_A_HALF = 2
+"""Rows in half a support: one would take the fast noise of an acceleration for a slow one, and of a slow
+decay in a noisy film would tell a third as much [1]."""
 MAX_RESTING_SHARE = 0.5
 """Share of a row's support at rest beyond which it says nothing of friction: the part may stick [1]."""
 FINER = 9
@@ -131,7 +134,8 @@ def _record_rows(
     noise_of_speed = record.speed_noise(narrow)
     force = force_about(record, delay_s)
     load = carried_load(base.response, record, force, (gravity, scale))
-    centres: IndexArray = np.arange(half + narrow, len(force) - half - narrow, half, dtype=np.int64)
+    apart = max(half // ROWS_A_HALF, 1)
+    centres: IndexArray = np.arange(half + narrow, len(force) - half - narrow, apart, dtype=np.int64)
     centres = centres[is_told(record, scale)[centres]]
     direction = direction_of_motion(velocity, scale, noise_of_speed)
     resting = _averaged((np.abs(direction) < 1.0).astype(np.float64), weight, centres)

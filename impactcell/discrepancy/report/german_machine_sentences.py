@@ -52,6 +52,13 @@ def headline(finding: MachineFinding) -> str:
             f"{before:.2f} Rauschschwellen), was der Simulation zufolge fehlt. Mit weniger Rauschen "
             "aufzeichnen, oder eine größere oder schnellere Bewegung."
         )
+    elif finding.verdict == "untested" and finding.clear_strengths and not finding.noise_is_motion:
+        names = enumerated([phrase(one.name) for one in finding.clear_strengths], "oder")
+        said = (
+            f"Nichts ist benannt: Die Abweichung von {before:.2f} Rauschschwellen ist an ihrer Grenze, und "
+            f"doch ist die Stärke von 0 verschieden ({names}). Länger, mit weniger Rauschen oder eine "
+            "größere oder schnellere Bewegung aufzeichnen."
+        )
     elif finding.verdict == "untested" and not finding.missing_blocks:
         said = (
             f"Keine Aussage: das Grundmodell lässt {before:.2f} dessen übrig, was für Rauschen gehalten "

@@ -238,6 +238,14 @@ NOTES: Final[Patterns] = (
      f"zurückgehaltene Messungen mit ihm um {m[2]} daneben, ohne um {m[3]}: {m[4]} in das Grundmodell setzen "
      "und vergleichen. Längere Messungen, ein feinerer oder schnellerer Sensor oder sein Rauschen, wo das "
      f"angegeben ist ({m[5]}), würden es in Blöcken zeigen."),
+    ((r"(.+): the gap is at its floor, yet over all blocks the strength of (.+) would be (\S+) \((\S+) to "
+     r"(\S+), SI\), clear of 0 .* are (\S+ .+?) off with it, (\S+) without\. .*: put (\S+) in .*"),
+     lambda m: f"{_any_of(m[1])}: Die Abweichung ist an ihrer Grenze, über alle Blöcke aber wäre die Stärke "
+     f"({_any_of(m[2])}) {m[3]} ({m[4]} bis {m[5]}, SI), von 0 verschieden und nicht durch Zufall, und ohne "
+     f"Rückführung simuliert liegen zurückgehaltene Messungen mit ihm um {m[6]} daneben, ohne um {m[7]}. Was "
+     f"das bewirkt, liegt unter dem Rauschen und ist nicht benannt: {m[8]} in das Grundmodell setzen und "
+     "vergleichen; längere Messungen, ein feinerer oder schnellerer Sensor oder eine größere Bewegung würden "
+     "es zeigen."),
     (r"What is held out, the last third of each record, is nearly at rest: it moves (\S+) times .*",
      (r"Zurückgehalten wird das letzte Drittel jeder Messung, und das ist fast in Ruhe: Es bewegt sich "
       r"\1-mal so weit wie die ganze Messung. Ganze Messungen zurückhalten (--test) oder die Messungen "

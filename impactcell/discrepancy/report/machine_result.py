@@ -105,6 +105,7 @@ def _remaining(finding: MachineFinding) -> dict[str, Any]:
         "shots": [],
         "share_in_shots": 0.0,
         "share_of_constants": 0.0,
+        "hints": [one.name for one in finding.clear_strengths],
     }
     if finding.is_at_floor:
         return said

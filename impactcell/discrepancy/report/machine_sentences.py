@@ -82,6 +82,12 @@ def _conclusion(finding: MachineFinding) -> str:
             "position hides what the simulation shows to be missing. Record with less noise, or a larger or "
             "faster motion."
         )
+    if finding.verdict == "untested" and finding.clear_strengths and not finding.noise_is_motion:
+        names = enumerated([phrase(one.name) for one in finding.clear_strengths], "or")
+        return (
+            f"Nothing is named: the held-out gap of {before:.2f} noise floors is at its floor, yet the "
+            f"strength of {names} is clear of 0. Record longer, with less noise, or a larger motion."
+        )
     if finding.verdict == "untested" and not finding.missing_blocks:
         return (
             f"Nothing can be said: the base model leaves {before:.2f} of what was taken for noise, so that "

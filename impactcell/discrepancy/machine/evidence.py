@@ -1,0 +1,44 @@
+"""What speaks for a term: the fall of the held-out gap with it, and its strength where no gap shows."""
+
+from dataclasses import dataclass
+
+from impactcell.discrepancy.search import MAX_P_VALUE, MIN_CLOSED_SHARE
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FallOfGap:
+    """Held-out gap with and without a term, 1 = noise floor.
+
+    Attributes
+    ----------
+    before, after : float
+    closed, low, high : float
+        Share of the gap above the floor that is closed, and its 95 % interval over blocks.
+    p_value : float
+    """
+
+    before: float
+    after: float
+    closed: float
+    low: float
+    high: float
+    p_value: float
+
+    @property
+    def is_real(self) -> bool:
+        """Whether held-out blocks confirm it."""
+        return self.is_real_among(1)
+
+    def is_real_among(self, tests: int) -> bool:
+        """Whether held-out blocks confirm it where so many tests share the error of one (Bonferroni)."""
+        return self.low > 0.0 and self.closed >= MIN_CLOSED_SHARE and self.p_value <= MAX_P_VALUE / tests
+
+
+@dataclass(frozen=True, slots=True)
+class ClearStrength:
+    """A term whose strength is clear of 0 though the gap is at its floor, and its 95 % interval."""
+
+    name: str
+    value: float
+    low: float
+    high: float
