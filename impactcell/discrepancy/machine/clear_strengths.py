@@ -36,7 +36,9 @@ def with_clear_strengths(fits: MachineFits, finding: MachineFinding) -> MachineF
         (_simulated(fits, finding, term), strength)
         for term, strength in _clear_strengths(fits, finding)[:MOST_TOLD]
     ]
-    clear = [(rmse, strength) for rmse, strength in simulated if rmse < most]
+    clear = sorted(
+        ((rmse, strength) for rmse, strength in simulated if rmse < most), key=lambda pair: pair[0]
+    )
     if not clear:
         return finding
     rmse, first = clear[0]

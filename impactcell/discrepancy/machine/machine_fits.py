@@ -47,6 +47,7 @@ WEIGHINGS = 3
 REFINEMENTS = 5
 """Rounds in which the grid of a shape is made finer about its best value, a round by a quarter."""
 COULOMB: Column = ("coulomb_friction", 0.0, 0)
+SPRING: Column = ("restoring_force", 0.0, 0)
 
 
 class MachineFits:
@@ -78,6 +79,7 @@ class MachineFits:
         self.plan = BlockPlan(self.block_s, held, PIECES_PER_BLOCK / widening(records, self.scale))
         self.gravity = base.gravity_torque.value
         self.delay_s = base.delay_s.value
+        self.stiffness = 0.0
         self.priors = nuisance_priors(base, self.gravity)
         self.doubt = DirectionDoubt()
         self._rows = lru_cache(maxsize=4)(self._build)
@@ -90,7 +92,8 @@ class MachineFits:
     def with_freed(self, number: HeldNumber) -> Self:
         """Leave free a number that the base model holds."""
         fits = type(self)(self.records, number.freed(self.base), self.candidates, self.held)
-        fits.gravity, fits.delay_s, fits.doubt = self.gravity, self.delay_s, self.doubt
+        fits.gravity, fits.delay_s, fits.stiffness = self.gravity, self.delay_s, self.stiffness
+        fits.doubt = self.doubt
         fits.shapes = dict(self.shapes)
         return fits
 
@@ -101,7 +104,7 @@ class MachineFits:
 
     def _build(self, gravity: float, delay_s: float) -> Rows:
         shapes = self._shapes_of((*self.base.terms, *self.candidates))
-        return build_rows(self.records, self.base, shapes, (gravity, delay_s))
+        return build_rows(self.records, self.base, shapes, (gravity, delay_s), stiffness=self.stiffness)
 
     def _shapes_of(self, choices: Iterable[TermChoice]) -> dict[TermChoice, tuple[float, ...]]:
         """Values of the shapes of some terms; a law has none."""
@@ -135,7 +138,8 @@ class MachineFits:
     def rows_with(self, choices: Sequence[TermChoice], freedom: Freedom) -> Rows:
         """Rows at the same, of other terms beside the base model's, and of other free functions."""
         shapes = self._shapes_of((*self.base.terms, *choices))
-        rows = build_rows(self.records, self.base, shapes, (self.gravity, self.delay_s), freedom)
+        known = self.gravity, self.delay_s
+        rows = build_rows(self.records, self.base, shapes, known, freedom, self.stiffness)
         return self.prepared(rows)
 
     def blocks(self, rows: Rows | None = None) -> tuple[Blocks, Blocks]:
@@ -209,6 +213,8 @@ class MachineFits:
 
         Where the delay is free, by what it leaves at its own; the delay that blocks are built at stays.
         """
+        self.stiffness = model.value(SPRING)
+        self._rows.cache_clear()
         built_at = self.gravity, self.delay_s
         if not self.base.delay_s.is_held:
             self._settle(model.terms)

@@ -89,6 +89,7 @@ def build_rows(
     shapes: Mapping[TermChoice, Sequence[float]],
     gravity_and_delay: tuple[float, float],
     freedom: Freedom = columns_of_corners,
+    stiffness: float = 0.0,
 ) -> Rows:
     """Rows of all records with a column for every term, shape and nuisance.
 
@@ -103,9 +104,14 @@ def build_rows(
         recorded.
     freedom : callable
         Gives columns beside those of nuisances and terms.
+    stiffness : float
+        Of a spring as it is known so far, by which the noise of a row goes [N/m or N m/rad].
     """
     scale = motion_scale(records, base.response, gravity_and_delay[0])
-    parts = [_record_rows(record, base, shapes, gravity_and_delay, (scale, freedom)) for record in records]
+    parts = [
+        _record_rows(record, base, shapes, (*gravity_and_delay, stiffness), (scale, freedom))
+        for record in records
+    ]
     return Rows(
         np.concatenate([part.target for part in parts]),
         {name: np.concatenate([part.columns[name] for part in parts]) for name in parts[0].columns},
@@ -120,10 +126,10 @@ def _record_rows(
     record: UniformRecord,
     base: BaseModel,
     shapes: Mapping[TermChoice, Sequence[float]],
-    gravity_and_delay: tuple[float, float],
+    known: tuple[float, float, float],
     scale_and_freedom: tuple[MotionScale, Freedom],
 ) -> Rows:
-    gravity, delay_s = gravity_and_delay
+    gravity, delay_s, stiffness = known
     scale, freedom = scale_and_freedom
     step = record.step_s
     half, narrow = half_supports(record, scale)
@@ -180,16 +186,39 @@ def _record_rows(
     # F(t + d) is linear in d about the delay of now, and counted from the one that is stated.
     columns["delay_s", 0.0, 0] = _averaged(force, slope, centres)
     target += (delay_s - base.delay_s.value) * columns["delay_s", 0.0, 0]
-    sensors = (record.inertia * record.noise[0]) ** 2 * record.noise_gain(curvature)
-    sensors += record.noise[1] ** 2 * float(weight @ weight)
+    sensors = _variance_by_position(record, centres, (weight, curvature), (gravity, stiffness))
+    sensors = sensors + record.noise[1] ** 2 * float(weight @ weight)
     return Rows(
         target,
         columns,
         np.zeros(target.size),
         record.time_s[centres],
-        np.full(target.size, sensors),
+        sensors,
         _averaged(doubt_of_direction(velocity, scale, noise_of_speed, narrow), weight, centres),
     )
+
+
+def _variance_by_position(
+    record: UniformRecord,
+    centres: IndexArray,
+    test: tuple[Samples, Samples],
+    pulls: tuple[float, float],
+) -> Samples:
+    """Variance of I q'' + G sin q + k q of each row by the position's noise, shape (n,).
+
+    Of weights I w'' + (G cos q + k) w: over a whole swing the two are as large, and of one noise.
+    """
+    weight, curvature = test
+    gravity, stiffness = pulls
+    if (gravity, stiffness) == (0.0, 0.0) or record.summed_up:
+        gain = record.inertia**2 * record.noise_gain(curvature)
+        return np.full(centres.size, record.noise[0] ** 2 * gain)
+    half = len(weight) // 2
+    pulling = gravity * np.cos(record.position) + stiffness
+    windows = np.lib.stride_tricks.sliding_window_view(pulling, len(weight))
+    weights = record.inertia * curvature + windows[centres - half] * weight
+    variance: Samples = record.noise[0] ** 2 * np.einsum("ij,ij->i", weights, weights)
+    return variance
 
 
 def residual_of(rows: Rows, columns: Sequence[Column], coefficients: Samples) -> Samples:

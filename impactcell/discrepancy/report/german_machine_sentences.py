@@ -46,18 +46,18 @@ _REFERENCES: Final = {
 def headline(finding: MachineFinding) -> str:
     """Say what is established and what remains."""
     before, after = finding.fall.before, finding.fall.after
-    if finding.verdict == "untested" and finding.noise_hides and not finding.missing_blocks:
-        said = (
-            "Keine Aussage: Das Rauschen der Position verdeckt in der Bewegungsgleichung (Abweichung "
-            f"{before:.2f} Rauschschwellen), was der Simulation zufolge fehlt. Mit weniger Rauschen "
-            "aufzeichnen, oder eine größere oder schnellere Bewegung."
-        )
-    elif finding.verdict == "untested" and finding.clear_strengths and not finding.noise_is_motion:
+    if finding.verdict == "untested" and finding.clear_strengths and not finding.noise_is_motion:
         names = enumerated([phrase(one.name) for one in finding.clear_strengths], "oder")
         said = (
             f"Nichts ist benannt: Die Abweichung von {before:.2f} Rauschschwellen ist an ihrer Grenze, und "
             f"doch ist die Stärke von 0 verschieden ({names}). Länger, mit weniger Rauschen oder eine "
             "größere oder schnellere Bewegung aufzeichnen."
+        )
+    elif finding.verdict == "untested" and finding.noise_hides and not finding.missing_blocks:
+        said = (
+            "Keine Aussage: Das Rauschen der Position verdeckt in der Bewegungsgleichung (Abweichung "
+            f"{before:.2f} Rauschschwellen), was der Simulation zufolge fehlt. Mit weniger Rauschen "
+            "aufzeichnen, oder eine größere oder schnellere Bewegung."
         )
     elif finding.verdict == "untested" and not finding.missing_blocks:
         said = (

@@ -76,17 +76,17 @@ def noise_keys(finding: MachineFinding) -> list[str]:
 
 def _conclusion(finding: MachineFinding) -> str:
     before, after = finding.fall.before, finding.fall.after
-    if finding.verdict == "untested" and finding.noise_hides and not finding.missing_blocks:
-        return (
-            f"Nothing can be said: in the equation of motion (gap {before:.2f} noise floors) noise of the "
-            "position hides what the simulation shows to be missing. Record with less noise, or a larger or "
-            "faster motion."
-        )
     if finding.verdict == "untested" and finding.clear_strengths and not finding.noise_is_motion:
         names = enumerated([phrase(one.name) for one in finding.clear_strengths], "or")
         return (
             f"Nothing is named: the held-out gap of {before:.2f} noise floors is at its floor, yet the "
             f"strength of {names} is clear of 0. Record longer, with less noise, or a larger motion."
+        )
+    if finding.verdict == "untested" and finding.noise_hides and not finding.missing_blocks:
+        return (
+            f"Nothing can be said: in the equation of motion (gap {before:.2f} noise floors) noise of the "
+            "position hides what the simulation shows to be missing. Record with less noise, or a larger or "
+            "faster motion."
         )
     if finding.verdict == "untested" and not finding.missing_blocks:
         return (
