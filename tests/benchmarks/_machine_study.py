@@ -27,6 +27,10 @@ from impactcell.discrepancy.machine import (
     TermChoice,
     investigate_machine,
 )
+from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.proof import gap as held_out_gap
+from impactcell.discrepancy.machine.trials import ChosenTerm
+from impactcell.discrepancy.machine.uniform_records import uniform_records
 from impactcell.records import Capture, Channel, Samples
 from tests.benchmarks.table import Table
 
@@ -206,11 +210,19 @@ def calibrated(machine: Machine, law: Law, gap: float, seed: int) -> float:
     strength, wanted = 0.1 * machine.coulomb, math.sqrt(gap**2 - 1.0)
     off = dict[float, float]()
     while len(off) < CALIBRATING_STEPS and min(off.values(), default=math.inf) > CALIBRATED:
-        finding = investigate_machine(campaign(machine, _times(law, strength), "white", seed), machine.base)
-        excess = math.sqrt(max(finding.fall.before**2 - 1.0, 0.02))
+        left = _nominal_gap(campaign(machine, _times(law, strength), "white", seed), machine.base)
+        excess = math.sqrt(max(left**2 - 1.0, 0.02))
         off[strength] = abs(math.log(excess / wanted))
         strength *= wanted / excess
     return min(off, key=off.__getitem__)
+
+
+def _nominal_gap(given: Campaign, base: BaseModel) -> float:
+    """Held-out gap of a base model alone."""
+    fits = MachineFits(uniform_records(given, base), base, (), None)
+    model = fits.fit(tuple(ChosenTerm(choice, 0.0) for choice in base.terms), settle=True)
+    fits.weigh(model)
+    return held_out_gap(fits.blocks()[1], fits.fit(model.terms, settle=False))
 
 
 def _times(law: Law, strength: float) -> Law:
