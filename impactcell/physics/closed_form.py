@@ -139,10 +139,12 @@ def departing(ratio: float, q: float, most: float) -> float:
 
 
 @compiled
-def half_wave(e: float, r: float, contact: Contact) -> tuple[float, int]:
+def half_wave(e: float, r: float, contact: Contact, breaks_away: bool) -> tuple[float, int]:  # noqa: FBT001
     """How long the damper stays as it is, and how that ends.
 
-    r = d' is the approach speed; r > 0 loads through the damper, r <= 0 unloads without it.
+    r = d' is the approach speed; r > 0 loads through the damper, r <= 0 unloads without it. A part that
+    `breaks_away` from rest speeds up, so that it does not stop in that half wave: with mu_s = mu_k it
+    begins with no acceleration at all, and rounding would say that it stops where it has just started.
     """
     if r > 0.0 or e < 0.0:
         of = contact.loading
@@ -150,7 +152,7 @@ def half_wave(e: float, r: float, contact: Contact) -> tuple[float, int]:
         ends = math.atan2(r, c) / of.frequency
         if ends <= 0.0:
             ends += math.pi / of.frequency
-        stops = stop_time(e, r, contact.velocity, of)
+        stops = NEVER if breaks_away else stop_time(e, r, contact.velocity, of)
         return (stops, STOPS) if stops <= ends else (ends, TURNS)
     ends = math.pi / contact.unloading.frequency  # of half a wave from r = 0, which is how unloading starts
     separates = separation_time(e, ends, contact.static_indentation, contact.unloading)
@@ -230,7 +232,7 @@ def displacements(v: float, strokes: Samples, plant: Samples, part: Samples, out
                     "the part would swing on its actuator without end: velocity, stroke, mass or place of "
                     "this tap are not those of a cell, in m/s, m, kg and m"
                 )
-            duration, ending = half_wave(e, r, contact)
+            duration, ending = half_wave(e, r, contact, swings == 1)
             if ending == FADES and count > j and math.isinf(strokes[count - 1]):
                 count -= 1
             swing = swing_from(e, r, contact.loading if r > 0.0 or e < 0.0 else contact.unloading)

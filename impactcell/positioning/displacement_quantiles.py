@@ -132,7 +132,10 @@ def plant_parameters(theta: Samples) -> Samples:
 def displacement_quantiles(
     velocity: float, strokes: Samples, scenarios: Scenarios, z: Samples, out: Samples
 ) -> None:
-    """Displacements at the nodes `z` for each stroke, written to `out`, shape (strokes, nodes), m."""
+    """Displacements at the nodes `z` for each stroke, written to `out`, shape (strokes, nodes), m.
+
+    All are nan for a stroke whose displacement is not known in one of the directions across.
+    """
     rows, part, weights = scenarios.plants, scenarios.part, scenarios.weights
     nodes, count = z.size, strokes.size
     middle = nodes // 2
@@ -173,8 +176,8 @@ def displacement_quantiles(
         add_discrepancy(moved, features, at_breakaway, weights[above])
         add_discrepancy(moved_other, features, at_breakaway, weights[below])
         for j in range(count):
-            step = max(abs(moved[j] - out[j, middle]), abs(moved_other[j] - out[j, middle])) / ACROSS_Z
-            square[j] += step * step
+            up, down = abs(moved[j] - out[j, middle]), abs(moved_other[j] - out[j, middle])
+            square[j] += math.nan if math.isnan(up + down) else (max(up, down) / ACROSS_Z) ** 2
     root, sliding_step, breakaway_step = scenarios.root, np.empty(count), np.empty(count)
     for a in range(root.shape[1]):
         along_weights(features, root[:, a], sliding_step)
@@ -187,6 +190,9 @@ def displacement_quantiles(
         indented_m = max(abs(slope[j]), (1.0 - features[0, j]) * min(depth, line[middle]))
         indented_m = max(indented_m, BREAKAWAY_SHARE * at_breakaway[BREAKAWAY, j])
         square[j] += (HALTING_STD * halting_m(line[middle], strokes[j])) ** 2
+        if math.isnan(square[j]):
+            out[j] = math.nan
+            continue
         for q in range(nodes):
             if q != middle:
                 by_itself = scenarios.scatter[q, 0] * line[middle]

@@ -47,6 +47,16 @@ def test_agrees_with_the_simulators_closed_form() -> None:
     np.testing.assert_allclose(mine, truth, rtol=1e-9, atol=1e-12)
 
 
+def test_a_part_whose_static_friction_is_its_kinetic_one_is_pushed_like_any_other() -> None:
+    """It breaks away without any acceleration: rounding took a fifth of these for parts that stop at once."""
+    rows = drawn(1000, 5)
+    rows[:, 3] = rows[:, 2]
+    k, b, mu_s, mu_k, viscous, mass, velocity, stroke = rows.T
+    truth = nominal_taps(k, b, mu_s, mu_k, mass, velocity, stroke, viscous).displacement_m
+    mine = np.array([of(row) for row in rows])
+    np.testing.assert_allclose(mine, truth, rtol=1e-9, atol=1e-12)
+
+
 def test_agrees_with_the_simulators_integrator() -> None:
     rows = drawn(40, 2)
     rows = rows[rows[:, 6] > 0.02][:12]

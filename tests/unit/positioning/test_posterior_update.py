@@ -14,12 +14,16 @@ from impactcell.positioning.mixture_components import (
 )
 from impactcell.positioning.model_hypotheses import condition_on_friction, parts_of, prior
 from impactcell.positioning.planner_posterior import (
+    RATIO,
+    STIFFNESS,
     PlannerPosterior,
     anticipate_learning,
     prior_of_plant,
     with_single_gaussian,
 )
 from impactcell.positioning.posterior_update import update_posterior
+from impactcell.positioning.tap import Tap
+from impactcell.positioning.tap_model import model_of_tap
 from simulator.plant_nominal import nominal_taps
 
 START = prior(6.5e5, 465.0, 0.2, 0.152, 0.0)
@@ -91,6 +95,20 @@ def test_learns_its_own_scatter() -> None:
     rough, _ = taught(0.0, 60, 1, sigma=0.06)
     assert calm.scatter < 0.025
     assert rough.scatter > 0.04
+
+
+@pytest.mark.parametrize("mass", [8.0, 11.0, 16.0, 23.0, 32.0])
+def test_a_push_teaches_where_static_friction_may_be_as_low_as_kinetic(mass: float) -> None:
+    """Of a contact stiffer than was thought, by pushes of several speeds; some taught nothing whatever."""
+    start = prior_of_plant(7.8e5, 655.0, 0.194, 0.1605, 0.0)
+    stds = np.full(start.mean.size, 0.01)
+    stds[RATIO], stds[STIFFNESS] = 0.1, 0.03  # of ln(mu_s / mu_k), which is 0.19: two of them are more
+    start, part = with_single_gaussian(start, start.mean, np.diag(stds**2)), np.array([mass, 9.81])
+    for velocity in np.geomspace(5e-3, 0.01, 8):
+        tap = Tap(float(velocity), 4.3e-4)
+        moved = nominal_taps(8.03e5, 655.0, 0.194, 0.1605, mass, velocity, 4.3e-4).displacement_m[0]
+        after = update_posterior(start, model_of_tap(tap, start, part), float(moved))
+        assert not np.array_equal(after.mean, start.mean)
 
 
 @pytest.mark.slow
