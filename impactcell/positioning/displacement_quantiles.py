@@ -134,7 +134,8 @@ def displacement_quantiles(
 ) -> None:
     """Displacements at the nodes `z` for each stroke, written to `out`, shape (strokes, nodes), m.
 
-    All are nan for a stroke whose displacement is not known in one of the directions across.
+    A direction across with a displacement on one side only, as of a push without a stroke that might not
+    end on the other, reaches as far on both; with none on either side all are nan.
     """
     rows, part, weights = scenarios.plants, scenarios.part, scenarios.weights
     nodes, count = z.size, strokes.size
@@ -177,7 +178,8 @@ def displacement_quantiles(
         add_discrepancy(moved_other, features, at_breakaway, weights[below])
         for j in range(count):
             up, down = abs(moved[j] - out[j, middle]), abs(moved_other[j] - out[j, middle])
-            square[j] += math.nan if math.isnan(up + down) else (max(up, down) / ACROSS_Z) ** 2
+            further = up if math.isnan(down) else max(down, up)  # down where above there is none
+            square[j] += (further / ACROSS_Z) ** 2
     root, sliding_step, breakaway_step = scenarios.root, np.empty(count), np.empty(count)
     for a in range(root.shape[1]):
         along_weights(features, root[:, a], sliding_step)

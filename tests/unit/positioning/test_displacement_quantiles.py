@@ -94,19 +94,27 @@ def test_a_push_is_no_surer_where_static_friction_may_be_as_low_as_kinetic(
         assert (band[:, 0] > band[:, Z.size // 2]).all()
 
 
-def test_a_displacement_that_is_not_known_across_is_not_known() -> None:
-    """Without a stroke: a push that might never end, were resistance three deviations higher, has no band."""
-    posterior = prior_of_plant(6.5e5, 465.0, 0.2, 0.152, 0.0)
+def test_a_push_that_might_not_end_is_as_uncertain_as_one_that_does() -> None:
+    """Without a stroke: were resistance three deviations higher, contact would never be lost."""
+    posterior = prior_of_plant(6.5e5, 465.0, 0.2, 0.152, 100.0)
     stds = np.full(posterior.mean.size, 1e-4)
     stds[VISCOUS] = 100.0
     posterior = with_single_gaussian(posterior, posterior.mean, np.diag(stds**2))
-    part, stroke, band = np.array([15.0, 9.81]), np.array([math.inf]), np.empty((1, Z.size))
-    velocity, above = 9e-3, np.empty(1)
+    part, stroke, velocity, moved_m = np.array([15.0, 9.81]), np.array([math.inf]), 9e-3, np.empty(1)
     scenarios = parameter_scenarios(posterior, Z, part, np.array([0.0, 1.0]))
-    displacements(velocity, stroke, scenarios.plants[Z.size // 2], part, above)
-    assert np.isfinite(above).all()
-    displacement_quantiles(velocity, stroke, scenarios, Z, band)
-    assert np.isnan(band).all()
+    along, above, below = np.split(scenarios.plants, [Z.size, Z.size + ACROSS])
+    ends = []
+    for row in (*above, *below):
+        displacements(velocity, stroke, row, part, moved_m)
+        ends.append(float(moved_m[0]))
+    assert np.isnan(ends).sum() == 1
+    bands = np.empty((2, 1, Z.size))
+    displacement_quantiles(velocity, stroke, scenarios, Z, bands[0])
+    turned = scenarios._replace(plants=np.concatenate([along, below, above]))
+    displacement_quantiles(velocity, stroke, turned, Z, bands[1])
+    np.testing.assert_array_equal(bands[0], bands[1])
+    middle = bands[0, 0, Z.size // 2]
+    assert bands[0].max() - middle > 0.99 * (np.nanmax(ends) - middle) > 0.0
 
 
 @pytest.mark.parametrize(("mass", "stroke"), [(18.0, 1.302e-3), (10.0, 1.1e-3)])

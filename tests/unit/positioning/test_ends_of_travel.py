@@ -130,11 +130,11 @@ def test_every_tap_that_is_planned_stays_within_the_travel(
 def test_a_target_that_no_tap_reaches_from_inside_is_refused_with_a_way_out() -> None:
     """A cell without a stroke cannot strike as gently as the end of the travel asks."""
     made = TapPlanner(
-        tolerance_m=50e-6, plant=NOMINAL, max_stroke_m=math.inf, two_sided=True, travel_m=TRAVEL_M
+        tolerance_m=200e-6, plant=NOMINAL, max_stroke_m=math.inf, two_sided=True, travel_m=TRAVEL_M
     )
     made.observe_friction(0.152, 0.002)
-    assert isinstance(made.next_tap(0.4e-3, 30.0, 20e-3), Tap)
-    answer = made.next_tap(0.4e-3, 30.0, TRAVEL_M[1] - 0.4e-3)
+    assert isinstance(made.next_tap(-0.4e-3, 30.0, 20e-3), Tap)
+    answer = made.next_tap(-0.4e-3, 30.0, TRAVEL_M[0] + 0.4e-3)
     assert isinstance(answer, Unreachable)
     assert "or may pass the end of the travel, 0.400 mm away; set a target further from it" in answer.reason
 
