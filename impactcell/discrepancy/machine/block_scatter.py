@@ -29,6 +29,8 @@ def half_intervals(grams: Samples, scores: Samples, matrix: Samples, level: floa
     level : float
         Probability that an interval covers [1].
     """
+    if not len(matrix):
+        return np.empty(0)
     size = np.sqrt(np.where(np.diag(matrix) > 0.0, np.diag(matrix), 1.0))
     values, vectors = np.linalg.eigh(matrix / np.outer(size, size))
     told = values > values[-1] * len(values) * np.finfo(float).eps

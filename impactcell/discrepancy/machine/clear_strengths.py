@@ -22,14 +22,18 @@ BY_CHANCE = 0.01
 """Probability that any term of the catalogue is clear of 0 where nothing is missing (Bonferroni) [1]."""
 MOST_TOLD = 3
 """Terms that are told at most. Our choice."""
+INTERVALS_WITHOUT = (
+    "The intervals of what is named are those without it: with it, values may lie beyond them."
+)
+"""What is said where another term is clear of 0 beside what is named."""
 SIMULATES_BETTER = 0.9
 """Share of the base model's error that the simulation with such a term may leave: of many rows a strength is
 clear of 0 by what rows are off at reversals, and no motion goes by that. Our choice."""
 
 
 def with_clear_strengths(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
-    """Tell terms whose strength is clear of 0, where nothing is established and the gap shows nothing."""
-    if finding.missing_blocks or finding.established or not finding.is_at_floor or not finding.steps:
+    """Tell terms whose strength is clear of 0 beside what is established, where the gap shows nothing."""
+    if finding.missing_blocks or not finding.is_at_floor or not finding.steps:
         return finding
     most = SIMULATES_BETTER * finding.simulated[-1].rmse
     simulated = [
@@ -43,33 +47,38 @@ def with_clear_strengths(fits: MachineFits, finding: MachineFinding) -> MachineF
         return finding
     rmse, first = clear[0]
     names = enumerated([in_words(one.name) for _, one in clear], "or")
+    named = enumerated([*map(in_words, finding.established)], "and") if finding.established else ""
     note = (
-        f"{names}: the gap is at its floor, yet over all "
-        f"blocks the strength of {in_words(first.name)} would be {first.value:.3g} ({first.low:.3g} to "
+        f"{names}: the gap is at its floor, yet{f' beside {named}' if named else ''} over all blocks the "
+        f"strength of {in_words(first.name)} would be {first.value:.3g} ({first.low:.3g} to "
         f"{first.high:.3g}, SI), clear of 0 and not by chance, and simulated open loop, held-out records are "
-        f"{rmse:.3g} {finding.base.unit} off with it, {finding.simulated[-1].rmse:.3g} without. What it does "
-        f"is below the noise, and it is not named: put {first.name} in the base model and compare; longer "
-        "records, a finer or faster sensor, or a larger motion would show it."
+        f"{rmse:.3g} {finding.base.unit} off with it, {finding.simulated[-1].rmse:.3g} without. In the "
+        f"equation of motion noise hides it, and it is not named: put {first.name} in the base model and "
+        "compare; longer records, a finer or faster sensor, or a larger motion would show it."
     )
+    notes = [*finding.notes, note]
+    if finding.established:
+        notes.append(INTERVALS_WITHOUT)
     told = tuple(strength for _, strength in clear)
-    return replace(finding, clear_strengths=told, notes=(*finding.notes, note))
+    return replace(finding, clear_strengths=told, notes=tuple(notes))
 
 
 def _simulated(fits: MachineFits, finding: MachineFinding, term: ChosenTerm) -> float:
-    """Error of the held-out simulation with a term beside the base model."""
-    model = fits.fit((*finding.nominal.terms, term), settle=False)
+    """Error of the held-out simulation with a term beside the final model."""
+    model = fits.fit((*finding.final.terms, term), settle=False)
     return simulate_held_out(finding, model).rmse
 
 
 def _clear_strengths(
     fits: MachineFits, finding: MachineFinding
 ) -> tuple[tuple[ChosenTerm, ClearStrength], ...]:
-    """Terms, each beside the base model, in the order of how far they are clear of 0."""
+    """Terms, each beside the final model, in the order of how far they are clear of 0."""
     training, held_out = fits.blocks()
     blocks = training.beside(held_out)
-    terms = [trial.term for trial in finding.steps[0].trials]
+    named = {term.choice.name for term in finding.final.terms}
+    terms = [trial.term for trial in finding.steps[-1].trials if trial.term.choice.name not in named]
     tests = sum(len(fits.shapes[term.choice.name]) * len(term.columns) for term in terms)
-    columns = fits.columns(finding.nominal.terms)
+    columns = fits.columns(finding.final.terms)
     found = []
     for term in terms:
         strength = _clearest(fits, blocks, (columns, term), 1.0 - BY_CHANCE / tests)

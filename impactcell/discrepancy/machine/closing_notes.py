@@ -49,7 +49,8 @@ def with_closing_notes(fits: MachineFits, finding: MachineFinding) -> MachineFin
 
 def _best_simulated(fits: MachineFits, finding: MachineFinding) -> BetterSimulation | None:
     """Give terms with which the held-out simulation errs half as much or less, the best first."""
-    if finding.established or finding.law is not None or not finding.errs_beyond_noise:
+    explained = finding.established or finding.law is not None or finding.number_off
+    if explained or not finding.errs_beyond_noise:
         return None
     errors: dict[str, float] = {}
     for term in _tried(fits, finding):

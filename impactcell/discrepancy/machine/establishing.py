@@ -11,6 +11,7 @@ from impactcell.discrepancy.machine.explained_by_numbers import (
     absent_gravity_notes,
     blamed_on_number,
     explained_by,
+    explains_most,
     held_number_notes,
 )
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
@@ -93,12 +94,15 @@ def establish(
         # Blocks are linear in the delay about that of the base model, which took over what the terms explain.
         final = fits.fit(final.terms, settle=True)
         settled = fits.blocks()
+    number_off = ""
     if enough:
         search = _search(fits, training, ())
         tried = [explained_by(search, fits.columns(final.terms), number) for number in numbers]
         explained = [one for one in tried if one is not None]
         notes = [*notes, *held_number_notes(explained)]
         steps = blamed_on_number(steps, explained)
+        most = explains_most(explained)
+        number_off = "" if most is None else most.number.name
     finding = MachineFinding(
         base=fits.base,
         records=fits.records,
@@ -119,6 +123,7 @@ def establish(
         scale=fits.scale,
         notes=tuple(notes),
         seed=seed,
+        number_off=number_off,
     )
     if finding.is_at_floor or fits.base.force_offset_by_record:
         return finding

@@ -65,9 +65,15 @@ def absent_gravity_notes(steps: Sequence[SelectionStep]) -> list[str]:
     ]
 
 
+def explains_most(explained: Sequence[Explained]) -> Explained | None:
+    """Give the number that would explain most of what remains; None where none does."""
+    most = max(explained, key=lambda one: one.share, default=None)
+    return None if most is None or most.share < MOST else most
+
+
 def blamed_on_number(steps: list[SelectionStep], explained: Sequence[Explained]) -> list[SelectionStep]:
     """Give as the reason why no term was taken the number that would explain most of what remains."""
-    most = max(explained, key=lambda one: one.share, default=None)
-    if most is None or most.share < MOST or not steps or steps[0].accepted is not None:
+    most = explains_most(explained)
+    if most is None or not steps or steps[0].accepted is not None:
         return steps
     return [replace(steps[0], reason=f"{most.words} of it"), *steps[1:]]

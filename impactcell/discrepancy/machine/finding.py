@@ -173,7 +173,9 @@ class MachineFinding:
     better_simulated : BetterSimulation or None
         Where nothing is established, a term that held-out blocks do not show and their simulation does.
     clear_strengths : tuple of ClearStrength
-        Where nothing is established and the gap is at its floor, the clearest first.
+        Terms beside what is established where the gap is at its floor, that which simulates best first.
+    number_off : str
+        Number that the base model holds and that would explain most of what remains; empty where none does.
     """
 
     base: BaseModel
@@ -201,6 +203,7 @@ class MachineFinding:
     simulated: tuple[OpenLoopError, ...] = ()
     better_simulated: BetterSimulation | None = None
     clear_strengths: tuple[ClearStrength, ...] = ()
+    number_off: str = ""
 
     @staticmethod
     def enough(training: Blocks, held_out: Blocks) -> bool:

@@ -2,8 +2,12 @@
 
 from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.finding import MachineFinding, MachineLaw
+from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.model_forces import resistance
+from impactcell.discrepancy.machine.proof import fall_of_gap
 from impactcell.discrepancy.machine.rival_forms import SPLINE_PIECES
+from impactcell.discrepancy.machine.selection import MIN_SHARE_OF_FREE
+from impactcell.discrepancy.machine.trials import TermSearch
 from impactcell.discrepancy.search import MAX_EXPECTED_GAP
 
 GIVES_ENERGY = "with the law that fits best friction would give energy in the range that was gone through"
@@ -43,6 +47,24 @@ def refusal_of(finding: MachineFinding, law: MachineLaw, tests: int) -> str:
     if least < -NEGATIVE_SHARE * largest:
         return GIVES_ENERGY
     return ""
+
+
+def listed_instead(fits: MachineFits, finding: MachineFinding, law: MachineLaw) -> str:
+    """Name a term of the catalogue that does as well as a law beside a number left free; empty if none does.
+
+    The search for names had that number held, where nothing of the catalogue may stand out.
+    """
+    training, held_out = fits.blocks()
+    own = finding.final.terms
+    search = TermSearch(training, fits.candidates, fits.shapes, fits.priors, fits.nonnegative)
+    columns = fits.columns(own)
+    before = search.losses(columns)
+    best = max((search.best_shape(one, columns, before) for one in fits.candidates), key=lambda one: one.gain)
+    without, with_it = (fits.fit(terms, settle=False) for terms in (own, (*own, best.term)))
+    fall = fall_of_gap(held_out, without, with_it, finding.seed)
+    closed = law.fall.before**2 - law.fall.after**2
+    does_as_well = fall.before**2 - fall.after**2 >= MIN_SHARE_OF_FREE * closed
+    return best.term.choice.name if fall.is_real and does_as_well else ""
 
 
 def _inertia_left(law: MachineLaw) -> float:

@@ -27,6 +27,7 @@ from impactcell.discrepancy.machine.law_refusal import (
     GIVES_ENERGY,
     NOT_IN_ONE_PLACE,
     NOTHING_HELPS,
+    listed_instead,
     refusal_of,
 )
 from impactcell.discrepancy.machine.law_terms import LAW_PREFIX, term_of
@@ -47,6 +48,7 @@ from impactcell.discrepancy.machine.ties import TIE_Z
 from impactcell.discrepancy.machine.trials import ChosenTerm, mean_over_error
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.discrepancy.search import MAX_EXPECTED_GAP
+from impactcell.physics.effect_names import in_words
 from impactcell.records import Samples
 
 MIN_SHARE = 0.05
@@ -74,6 +76,12 @@ def with_law(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
         freed.append(outcome)
         fits = fits.with_freed(outcome)
         outcome = _find_law(fits, finding)
+    listed = listed_instead(fits, finding, outcome) if freed and isinstance(outcome, MachineLaw) else ""
+    if listed:
+        outcome = (
+            f"{in_words(listed)} beside {freed[0].phrase} does as well as any law; {freed[0].keys} would tell"
+        )
+        return replace(finding, law_refused=outcome)
     if isinstance(outcome, MachineLaw):
         notes = (*finding.notes, *(number.beside_a_law for number in freed))
         if COVARIATES[outcome.place.removeprefix(LAW_PREFIX)] == "position":

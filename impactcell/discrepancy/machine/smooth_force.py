@@ -173,8 +173,8 @@ class SmoothForce:
         self, columns: Sequence[Column], term: Sequence[Column], precision: Samples
     ) -> tuple[float, float]:
         """Logarithm of the evidence of a model and a term beside it, and s² at the level of the largest."""
-        places = np.array([self._place[column] for column in (*columns, *term)])
-        bounded = np.array([column in self._nonnegative for column in (*columns, *term)])
+        places = np.array([self._place[column] for column in (*columns, *term)], dtype=np.int64)
+        bounded = np.array([column in self._nonnegative for column in (*columns, *term)], dtype=bool)
         is_own = np.arange(len(places)) >= len(columns)
         bounds = bounded, is_own
         found = [self._at(force, LEVELS**2, places, bounds, precision[places]) for force in self._forces]

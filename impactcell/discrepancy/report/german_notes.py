@@ -238,14 +238,18 @@ NOTES: Final[Patterns] = (
      f"zurückgehaltene Messungen mit ihm um {m[2]} daneben, ohne um {m[3]}: {m[4]} in das Grundmodell setzen "
      "und vergleichen. Längere Messungen, ein feinerer oder schnellerer Sensor oder sein Rauschen, wo das "
      f"angegeben ist ({m[5]}), würden es in Blöcken zeigen."),
-    ((r"(.+): the gap is at its floor, yet over all blocks the strength of (.+) would be (\S+) \((\S+) to "
-     r"(\S+), SI\), clear of 0 .* are (\S+ .+?) off with it, (\S+) without\. .*: put (\S+) in .*"),
-     lambda m: f"{_any_of(m[1])}: Die Abweichung ist an ihrer Grenze, über alle Blöcke aber wäre die Stärke "
-     f"({_any_of(m[2])}) {m[3]} ({m[4]} bis {m[5]}, SI), von 0 verschieden und nicht durch Zufall, und ohne "
-     f"Rückführung simuliert liegen zurückgehaltene Messungen mit ihm um {m[6]} daneben, ohne um {m[7]}. Was "
-     f"das bewirkt, liegt unter dem Rauschen und ist nicht benannt: {m[8]} in das Grundmodell setzen und "
-     "vergleichen; längere Messungen, ein feinerer oder schnellerer Sensor oder eine größere Bewegung würden "
-     "es zeigen."),
+    ((r"(.+): the gap is at its floor, yet(?: beside (.+))? over all blocks the strength of (.+) would be "
+      r"(\S+) \((\S+) to (\S+), SI\), clear of 0 .* are (\S+ .+?) off with it, (\S+) without\. .*: put (\S+) "
+      r"in .*"),
+     lambda m: f"{_any_of(m[1])}: Die Abweichung ist an ihrer Grenze, "
+     f"{f'neben „{_terms(m[2])}“' if m[2] else 'doch'} wäre über alle Blöcke die Stärke ({_any_of(m[3])}) "
+     f"{m[4]} ({m[5]} bis {m[6]}, SI), von 0 verschieden und nicht durch Zufall, und ohne Rückführung "
+     f"simuliert liegen zurückgehaltene Messungen mit ihm um {m[7]} daneben, ohne um {m[8]}. In der "
+     f"Bewegungsgleichung verdeckt es das Rauschen, und es ist nicht benannt: {m[9]} in das Grundmodell "
+     "setzen und vergleichen; längere Messungen, ein feinerer oder schnellerer Sensor oder eine größere "
+     "Bewegung würden es zeigen."),
+    (r"The intervals of what is named are those without it: with it, values may lie beyond them\.",
+     "Die Intervalle des Benannten gelten ohne das: Mit ihm können Werte außerhalb von ihnen liegen."),
     (r"What is held out, the last third of each record, is nearly at rest: it moves (\S+) times .*",
      (r"Zurückgehalten wird das letzte Drittel jeder Messung, und das ist fast in Ruhe: Es bewegt sich "
       r"\1-mal so weit wie die ganze Messung. Ganze Messungen zurückhalten (--test) oder die Messungen "

@@ -38,6 +38,9 @@ REASONS: Final[Patterns] = (
     (r"(an?\w* .+) does as well as any function of speed, load or position",
      lambda m: f"{said} erklärt es so gut wie jede Funktion von Geschwindigkeit, Last oder Ort"
      if (said := held_number(m[1])) else ""),
+    (r"(.+) beside (an?\w* .+) does as well as any law",
+     lambda m: f"neben: {said} erklärt es „{term_name(identifier_of(m[1]))}“ so gut wie jedes Gesetz"
+     if (said := held_number(m[2])) else ""),
     ((r"(\w+[^;]* among the nuisances of the base model(?: or a free \w+)?|"
       r"a free \w+(?: above 0)? in the base model) would tell"),
      lambda m: f"{key_of(m[1])} zeigte es"),
