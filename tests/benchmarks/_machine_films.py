@@ -2,7 +2,8 @@
 
 `python -m tests.benchmarks._machine_films [--seeds N]` films a bob on a string at 30 frames a second, by
 scipy's integrator, and asks what its base model of gravity alone lacks. It adds rows to `--rows` and goes
-on where it ended; `--table` only prints. Seeds of the report are from 1 080 000 on, those of `--tuning` below 1000.
+on where it ended; `--table` only prints. Seeds of the report are from 1 080 000 on, those of `--tuning` below
+1000.
 """
 
 import argparse

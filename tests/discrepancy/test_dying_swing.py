@@ -98,6 +98,12 @@ def test_what_slows_it_down_is_seen_in_a_film(drag: float, noise: float, verdict
         [effect] = machine_document(found)["effects"]
         value = effect["parameters"]["drag_coefficient_n_m_s2_per_rad2"]["value"]
         assert value == pytest.approx(drag, rel=0.2)
+        assert [*effect["tied_parameters"]] == effect["tied_with"]
+        # A drag c takes as much as a viscous friction of c times a speed, which is 6.2 rad/s at most.
+        if viscous := effect["tied_parameters"].get("viscous_friction"):
+            coefficient = viscous["viscous_coefficient_n_m_s_per_rad"]
+            assert coefficient["ci95"][0] < coefficient["value"] < coefficient["ci95"][1]
+            assert drag < coefficient["value"] < 6.2 * drag
 
 
 def test_nothing_is_named_where_nothing_is_missing() -> None:

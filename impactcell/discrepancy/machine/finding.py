@@ -56,6 +56,10 @@ class FittedModel:
             return 0.0
         return float(self.fit.coefficients[self.fit.columns.index(column)])
 
+    def term(self, name: str) -> ChosenTerm:
+        """One of its terms."""
+        return next(term for term in self.terms if term.choice.name == name)
+
     def nuisance(self, name: str) -> float:
         """Coefficient of a nuisance."""
         return self.value((name, 0.0, 0))
@@ -174,6 +178,8 @@ class MachineFinding:
         Where nothing is established, a term that held-out blocks do not show and their simulation does.
     clear_strengths : tuple of ClearStrength
         Terms beside what is established where the gap is at its floor, that which simulates best first.
+    tied_models : mapping
+        By the name of a tied term, the final model with it in the place of the named one.
     number_off : str
         Number that the base model holds and that would explain most of what remains; empty where none does.
     """
@@ -203,6 +209,7 @@ class MachineFinding:
     simulated: tuple[OpenLoopError, ...] = ()
     better_simulated: BetterSimulation | None = None
     clear_strengths: tuple[ClearStrength, ...] = ()
+    tied_models: Mapping[str, FittedModel] = field(default_factory=dict)
     number_off: str = ""
 
     @staticmethod

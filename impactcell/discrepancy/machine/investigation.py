@@ -24,6 +24,7 @@ from impactcell.discrepancy.machine.record_notes import notes_of_records
 from impactcell.discrepancy.machine.release import from_release
 from impactcell.discrepancy.machine.simulation import with_simulations
 from impactcell.discrepancy.machine.terms import CATALOGUE
+from impactcell.discrepancy.machine.tied_models import with_tied_models
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
 from impactcell.discrepancy.machine.whole_turns import without_wraps
@@ -75,7 +76,8 @@ def investigate_machine(
     if slip is not None:
         return told_of_slip(fits, finding, slip, notes)
     finding = with_experiments(fits, with_degrees_asked_for(with_law(fits, finding)))
-    return with_closing_notes(fits, with_clear_strengths(fits, finding))
+    finding = with_tied_models(fits, with_clear_strengths(fits, finding))
+    return with_closing_notes(fits, finding)
 
 
 def _fits_of(

@@ -100,6 +100,15 @@ def machine_page_context(
         "found": parameter_rows(
             ((effect["effect"], effect["parameters"]) for effect in document["effects"]), coordinate, language
         ),
+        "instead": parameter_rows(
+            (
+                (rival, parameters)
+                for effect in document["effects"]
+                for rival, parameters in effect["tied_parameters"].items()
+            ),
+            coordinate,
+            language,
+        ),
         "stated": parameter_rows((("", document["nominal"]),), coordinate, language),
         "of_law": parameter_rows(
             (("", (document["law"] or {}).get("parameters", {})),), coordinate, language

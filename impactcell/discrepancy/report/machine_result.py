@@ -65,7 +65,7 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
         | {
             name: value
             for term in nominal
-            for name, value in _parameters(finding, term, in_full=True).items()
+            for name, value in _parameters(finding, finding.final, term, in_full=True).items()
         },
         "noise_floor": {
             "noise_std": [
@@ -213,31 +213,36 @@ def _effect(finding: MachineFinding, term: ChosenTerm) -> dict[str, Any]:
             "phase": _phase(finding),
             "depends_on": [term.choice.covariate] if term.choice.covariate else [],
         },
-        "parameters": _parameters(finding, term),
+        "parameters": _parameters(finding, finding.final, term),
+        "tied_parameters": {
+            rival: _parameters(finding, model, model.term(rival))
+            for rival, model in finding.tied_models.items()
+            if rival in finding.tied_with[name]
+        },
     }
     return document | ({"covariate": term.choice.covariate} if term.choice.covariate else {})
 
 
-def _parameters(finding: MachineFinding, chosen: ChosenTerm, *, in_full: bool = False) -> dict[str, Any]:
+def _parameters(
+    finding: MachineFinding, model: FittedModel, chosen: ChosenTerm, *, in_full: bool = False
+) -> dict[str, Any]:
     """Strengths with their intervals, and the shape where there is one; `in_full` names the term too."""
-    term, fit = term_of(chosen.choice), finding.final.fit
+    term, fit = term_of(chosen.choice), model.fit
     prefix = f"{chosen.choice.name}." if in_full else ""
     document: dict[str, Any] = {}
     for (name, unit), column in zip(term.strengths, chosen.columns, strict=True):
         place = fit.columns.index(column)
-        document[prefix + parameter_name(name, unit, finding.base.coordinate)] = _estimate(
-            finding.final, place
-        )
+        document[prefix + parameter_name(name, unit, finding.base.coordinate)] = _estimate(model, place)
     if term.shape is not None:
         per_s = "_per_s" if term.shape.covariate == "speed" else ""
         name = f"{term.shape.name}_{SYMBOLS[finding.base.coordinate]['q']}{per_s}"
-        document[prefix + name] = _shape(finding, chosen)
+        document[prefix + name] = _shape(finding, model, chosen)
     return document
 
 
-def _shape(finding: MachineFinding, chosen: ChosenTerm) -> dict[str, Any]:
+def _shape(finding: MachineFinding, model: FittedModel, chosen: ChosenTerm) -> dict[str, Any]:
     """Shape of a term with its interval; an end that the records do not tell is null."""
-    ends = finding.final.shape_intervals[chosen.choice.name]
+    ends = model.shape_intervals.get(chosen.choice.name, (0.0, math.inf))
     grid = shape_grid(term_of(chosen.choice), finding.scale)
     return {
         "value": round_digits(chosen.shape),
