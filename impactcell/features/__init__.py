@@ -4,7 +4,7 @@ from impactcell.features.channels import CheckedChannel, CheckedForce
 from impactcell.features.extraction import Fault, Features, extract, required
 from impactcell.features.held_drive import drive_noise_std, is_command, samples_held
 from impactcell.features.measured import MeasuredFeature
-from impactcell.features.noise import noise_std, white_noise_std
+from impactcell.features.noise import are_equal_steps, noise_std, white_noise_std
 from impactcell.features.segment import SlideSegment
 from impactcell.features.slide import SlideFeatures
 from impactcell.features.spikes import without_spikes
@@ -17,6 +17,7 @@ __all__ = [
     "MeasuredFeature",
     "SlideFeatures",
     "SlideSegment",
+    "are_equal_steps",
     "drive_noise_std",
     "extract",
     "is_command",

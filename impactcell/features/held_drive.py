@@ -28,16 +28,16 @@ COMMAND_SHARE = 0.25
 """Apparent noise of the updates over their spread, above which each is chosen by itself."""
 
 
-def drive_noise_std(values: Samples) -> float:
+def drive_noise_std(values: Samples, times: Samples | None = None) -> float:
     """Estimate the noise of a drive, which may be held from one update to the next.
 
-    Of a drive that is not held it is `white_noise_std`. What is held shows no noise between its updates; if
-    it was measured, its updates do, as any samples, and white noise of the same density is the root of how
-    many samples one is held larger. A command has none: 0.
+    Of a drive that is not held it is `white_noise_std`, by its times where they are given. What is held
+    shows no noise between its updates; if it was measured, its updates do, as any samples, and white noise of
+    the same density is the root of how many samples one is held larger. A command has none: 0.
     """
     places = _updates(values)
     if not len(places):
-        return white_noise_std(values)
+        return white_noise_std(values, times)
     if is_command(values):
         return 0.0
     return white_noise_std(values[places]) * math.sqrt(samples_held(values))

@@ -3,6 +3,8 @@
 import math
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from impactcell.numerics.local_polynomial import median_third_difference
 from impactcell.records import Channel, Samples
@@ -20,6 +22,12 @@ that is three steps wide 9 in 100 are."""
 TRIMMED_STD, TRIMMED_STEPS, TRIMMING_ROUNDS = 5.0, 8.0, 3
 """Third differences on a raster that are left out, in their own standard deviations and in its steps, of
 which rounding alone makes up to four; jumps and spikes are gone after so many rounds."""
+EQUAL_STEPS = 0.05
+"""Share of the usual step by which another may be off it and count as equal: frames whose times were rounded
+to 1 ms are, to 3 % at 30 in a second."""
+MIN_EQUAL_SHARE = 0.25
+"""Third differences over equal steps that tell a channel's noise, as a share of all: of a film that lost 35 %
+of its frames, each by itself, they are a quarter."""
 MIN_RELATIVE_NOISE = 1e-9
 """Noise over the largest value below which a channel without any is taken to have this: rounding of data."""
 
@@ -38,7 +46,12 @@ def noise_std(channel: Channel) -> float:
     return max(white_noise_std(finite), raster, MIN_RELATIVE_NOISE * float(np.abs(finite).max()))
 
 
-def white_noise_std(values: Samples) -> float:
+def are_equal_steps(times: Samples) -> bool:
+    """Whether samples follow one another in equal steps."""
+    return bool(np.all(_is_usual(np.diff(times))))
+
+
+def white_noise_std(values: Samples, times: Samples | None = None) -> float:
     """Estimate the noise that differs from sample to sample, from third differences.
 
     A motion that is a parabola over four samples does not move them, and half of them may be off for a jump
@@ -46,11 +59,16 @@ def white_noise_std(values: Samples) -> float:
     rounded, and that says little: then it is their root mean square without the largest, and no less than
     what rounding makes; nan for fewer than four values, which may not hold any that is not finite. So it is
     above 0 for an exact record, too: `noise_of` of the numerics tells whether a channel shows noise at all.
+    Where `times` tell that steps are not equal, as where samples were lost, those over equal ones count, or
+    if they are few all, by weights that a parabola does not move either.
     """
     if len(values) < 4:
         return math.nan
-    median = median_third_difference(values)
-    third = np.diff(values, 3)
+    if times is None or are_equal_steps(times):
+        third, median = np.diff(values, 3), median_third_difference(values)
+    else:
+        third = _third_differences(values, times)
+        median = float(np.median(np.abs(third)))
     apart = np.abs(np.abs(third) - median)
     is_tied = apart <= ROUNDING * float(np.abs(values).max())
     if float(np.mean(is_tied)) < MIN_TIED:
@@ -62,3 +80,23 @@ def white_noise_std(values: Samples) -> float:
         largest = max(TRIMMED_STD * float(third.std()), TRIMMED_STEPS * step)
         third = third[np.abs(third) <= largest]
     return max(float(third.std()) / THIRD_DIFFERENCE_STD, step / math.sqrt(12.0))
+
+
+def _is_usual(steps: Samples) -> NDArray[np.bool_]:
+    usual = np.median(steps)
+    is_usual: NDArray[np.bool_] = np.abs(steps - usual) <= EQUAL_STEPS * usual
+    return is_usual
+
+
+def _third_differences(values: Samples, times: Samples) -> Samples:
+    """Third differences over equal steps; if those are few divided ones, of weights as large in all."""
+    is_equal = np.all(sliding_window_view(_is_usual(np.diff(times)), 3), axis=1)
+    if float(is_equal.mean()) >= MIN_EQUAL_SHARE:
+        third: Samples = np.diff(values, 3)[is_equal]
+        return third
+    near = sliding_window_view(times, 4)
+    apart = near[:, :, np.newaxis] - near[:, np.newaxis, :] + np.eye(4)
+    weights = 1.0 / np.prod(apart, axis=2)
+    weights *= THIRD_DIFFERENCE_STD / np.sqrt(np.sum(weights**2, axis=1, keepdims=True))
+    divided: Samples = np.sum(weights * sliding_window_view(values, 4), axis=1)
+    return divided

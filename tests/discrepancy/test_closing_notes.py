@@ -2,11 +2,14 @@
 
 import json
 import math
+from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.signal import lfilter
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import (
@@ -110,6 +113,61 @@ def test_where_the_base_model_has_it_none_is_told() -> None:
     assert finding.better_simulated is None
     assert machine_document(finding)["simulation"]["better_with"] is None
     assert not any("in the base model and compare" in note for note in finding.notes)
+
+
+def correlated(size: int, std: float, correlation: float, seed: int) -> np.ndarray:
+    """Noise of first order: each sample has so much of the one before."""
+    fresh = np.random.default_rng(seed).normal(0.0, std, size)
+    fresh[1:] *= math.sqrt(1.0 - correlation**2)
+    return np.asarray(lfilter([1.0], [1.0, -correlation], fresh))
+
+
+def swinging(friction: float, noise: Callable[[int, int], np.ndarray], std: float | None) -> MachineFinding:
+    """Four swings at 60 frames a second, and a base model of gravity alone."""
+    time = np.arange(0.0, 25.0, 1.0 / 60.0)
+    shots = []
+    for number, release in enumerate((0.5, 0.9, 1.2, 0.8), 1):
+        run = solve_ivp(
+            lambda _, state: (state[1], -19.62 * math.sin(state[0]) - friction * math.tanh(state[1] / 1e-3)),
+            (0.0, 25.0), (release, 0.0), t_eval=time, rtol=1e-8, atol=1e-10, max_step=0.01,
+        )  # fmt: skip
+        angle = run.y[0] + noise(time.size, number)
+        shots.append(Capture(number, math.nan, math.nan, None, Channel(time, angle, std)))
+    base = BaseModel(
+        Coordinate.ROTATION, inertia=NumberPrior(1.0), gravity_torque=NumberPrior(19.6, math.inf)
+    )
+    campaign = Campaign(Excitation.FREE_SLIDE, tuple(shots), coordinate=Coordinate.ROTATION)
+    return investigate_machine(campaign, replace(base, terms=()))
+
+
+def wandering(finding: MachineFinding) -> list[str]:
+    return [note for note in finding.notes if "noise that goes on from sample to sample" in note]
+
+
+def test_noise_that_goes_on_from_sample_to_sample_is_told() -> None:
+    """It was unknown without a word. Told by its density it is no gap."""
+    std, correlation = 8e-3, 0.7
+
+    def noise(size: int, seed: int) -> np.ndarray:
+        return correlated(size, std, correlation, seed)
+
+    finding = swinging(0.0, noise, None)
+    assert finding.verdict == "unknown"
+    [note] = wandering(finding)
+    assert "state noise_std_rad in campaign.yaml" in note
+    language, german = german_machine_sentences.note(note)
+    assert language == "de"
+    assert f"{finding.simulated[-1].rmse:.3g} rad".replace(".", ",") in german
+    assert "noise_std_rad in campaign.yaml angeben" in german
+    told = swinging(0.0, noise, std * math.sqrt((1.0 + correlation) / (1.0 - correlation)))
+    assert told.verdict == "no_gap"
+    assert not wandering(told)
+
+
+def test_of_friction_that_is_missing_it_is_not_told() -> None:
+    finding = swinging(0.12, lambda size, seed: np.random.default_rng(seed).normal(0.0, 8e-3, size), None)
+    assert finding.established == ("coulomb_friction",)
+    assert not wandering(finding)
 
 
 def test_held_out_thirds_at_rest_are_told() -> None:

@@ -1,11 +1,13 @@
 """What is said of a finding once it is done: by simulation, and where a number rests at its bound."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
 
 from impactcell.campaign import COLUMNS
+from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.held_number import DELAY
 from impactcell.discrepancy.machine.machine_fits import MachineFits
@@ -27,12 +29,21 @@ MOST_TOLD = 3
 """Terms that are told at most. Our choice."""
 REST_SHARE = 0.1
 """Share of a record's motion below which what is held out of it is called at rest. Our choice."""
+FOLLOWS_PERCENT = 90.0
+"""Fit of a simulation from which on it follows what was held out but for something small. Our choice."""
+FEW_NOISES = 4.0
+"""Error of a simulated position over the noise that neighbouring samples show, up to which it may be noise of
+which neighbours share much: correlated by 0.7 it is 2.4 times what they show. Our choice."""
+EXPLAINED = re.compile(r" would (?:explain|take) \d+ % of what remains: ")
+"""In a note: something else is told that explains what remains."""
 
 
 def with_closing_notes(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
     """Say which term simulates far better where none is established, and what else goes by the outcome."""
     better = _best_simulated(fits, finding)
     notes = [*finding.notes, *_note_of_delay(finding)]
+    if better is None:
+        notes += _note_of_wandering(finding)
     if fits.held is None:
         notes += _note_of_rest(finding)
     if better is not None and not finding.clear_strengths:  # where these say it
@@ -111,5 +122,33 @@ def _note_of_delay(finding: MachineFinding) -> list[str]:
     note = (
         f"delay_s comes to rest at {finding.final.delay_s:.3g} s, the end of what the base model allows: see "
         "whether force and position have one clock, or give delay_s a larger std."
+    )
+    return [note]
+
+
+def _note_of_wandering(finding: MachineFinding) -> list[str]:
+    """Say that noise which goes on from sample to sample leaves the same as what was found.
+
+    A force that is missing adds up in a simulation; noise does not: it errs by no more noises there than the
+    equation of motion does, or by few.
+    """
+    records = finding.records
+    unnamed = finding.verdict == "unknown" and finding.law is None
+    if not unnamed or finding.base.response is Response.FORCE or not finding.simulated:
+        return []
+    if any(record.noise_is_stated[0] or record.summed_up for record in records):
+        return []
+    simulated, noise = finding.simulated[-1], max(record.position_noise for record in records)
+    is_small = simulated.rmse <= max(FEW_NOISES, finding.fall.after) * noise
+    is_explained = any(map(EXPLAINED.search, finding.notes))
+    if not is_small or is_explained or simulated.fit_percent < FOLLOWS_PERCENT:
+        return []
+    key, unit = COLUMNS[finding.base.coordinate]["position_noise"], finding.base.unit
+    note = (
+        f"Simulated open loop, the model follows held-out records to {simulated.rmse:.3g} {unit}, and "
+        f"neighbouring samples differ by a noise of {noise:.3g}: noise that goes on from sample to sample, "
+        "or a camera or zero that drifts, leaves as much. Record the part at rest for a while. If it seems to "
+        f"move there, too, state {key} in campaign.yaml: the standard deviation at rest times "
+        "sqrt((1 + r) / (1 - r)), r the correlation of one sample with the next."
     )
     return [note]

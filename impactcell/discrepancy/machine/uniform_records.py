@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine.base_model import BaseModel, Response
+from impactcell.discrepancy.machine.channel_noise import force_noise, position_noise
 from impactcell.discrepancy.machine.channel_values import cleaned_position, held_mean, without_spikes
 from impactcell.discrepancy.machine.lost_stretches import (
     MOST_CLIPPED,
@@ -19,9 +20,10 @@ from impactcell.discrepancy.machine.lost_stretches import (
     sound_neighbours,
 )
 from impactcell.discrepancy.machine.smoothing import of_speeds, slope_weights
+from impactcell.discrepancy.machine.uneven_steps import at_equal_steps, values_of_a_sample
 from impactcell.errors import CampaignError
-from impactcell.features import drive_noise_std, is_command, noise_std, samples_held, white_noise_std
-from impactcell.records import Capture, Channel, Samples
+from impactcell.features import is_command
+from impactcell.records import Capture, Samples
 
 MIN_HALF_SUPPORT = 5
 """Least half support of a test function [samples]: fewer do not average the noise of a sensor."""
@@ -51,8 +53,9 @@ class UniformRecord:
         where `force` is that from half a sample before to half a sample after; None of a measured one.
     summed_up : bool
         The position is the sum of a recorded speed, and so is its noise.
-    force_span : float
-        Values that one sample of the force makes, where it is held or sampled more slowly than the position.
+    position_span, force_span : float
+        Values that one sample makes in the mean, where others were lost; of a force also where it is held or
+        sampled more slowly than the position. `noise` has the root of it more than a sample.
     finer : int
         Samples made of one of the sensors'. Noise is what white noise of the same density has.
     gaps : tuple of (float, float)
@@ -76,6 +79,7 @@ class UniformRecord:
     spikes: int
     noise: tuple[float, float]
     noise_is_stated: tuple[bool, bool] = (False, False)
+    position_span: float = 1.0
     force_span: float = 1.0
     finer: int = 1
     gaps: Gaps = ()
@@ -151,7 +155,8 @@ class UniformRecord:
     def sensor_noise(self) -> tuple[float, float]:
         """Standard deviation of position and force as the sensors sample them."""
         position, force = self.noise
-        return position / math.sqrt(self.finer), force / math.sqrt(self.finer * self.force_span)
+        made_of_position, made_of_force = self.finer * self.position_span, self.finer * self.force_span
+        return position / math.sqrt(made_of_position), force / math.sqrt(made_of_force)
 
 
 def uniform_records(campaign: Campaign, base: BaseModel) -> tuple[UniformRecord, ...]:
@@ -200,8 +205,10 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         as_it_was_beside(around, channel, *clean(channel.values))
         for around, channel, clean in zip(lost, channels, (cleaned_position, without_spikes), strict=False)
     ]
-    values = [
-        np.interp(time, channel.time_s, clean) for channel, (clean, _) in zip(channels, cleaned, strict=True)
+    values = [at_equal_steps(channels[0].time_s, cleaned[0][0], time)]
+    values += [
+        np.interp(time, channel.time_s, clean)
+        for channel, (clean, _) in zip(channels[1:], cleaned[1:], strict=True)
     ]
     command = None
     if is_held:
@@ -210,10 +217,9 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         half = 0.5 * step
         values[1] = held_mean(channels[1].time_s, channels[1].values, time - half, time + half)
         command = held_mean(channels[1].time_s, channels[1].values, time, time + step)
-    noise, stated = _position_noise(shot.position, cleaned[0][0])
-    force_noise, force_span = 0.0, 1.0
-    if shot.force is not None:
-        force_noise, force_span = _force_noise(shot.force, cleaned[1][0], step)
+    noise, stated = position_noise(shot.position, cleaned[0][0])
+    spans = [values_of_a_sample(channel.time_s, time) for channel in channels]
+    noise_of_force, held = (0.0, 1.0) if shot.force is None else force_noise(shot.force, cleaned[1][0])
     covariates = {
         name: value
         for name, value in shot.covariates.items()
@@ -229,9 +235,10 @@ def _uniform(shot: Capture, base: BaseModel, *, driven: bool) -> UniformRecord:
         inertia=inertia,
         covariates=covariates,
         spikes=sum(spikes for _, spikes in cleaned),
-        noise=(noise, abs(gain) * force_noise),
+        noise=(noise * math.sqrt(spans[0]), abs(gain) * (noise_of_force * math.sqrt(spans[-1]))),
         noise_is_stated=(stated, channels[-1].noise_std is not None),
-        force_span=force_span,
+        position_span=spans[0],
+        force_span=held * spans[-1] if shot.force is not None else 1.0,
         gaps=gaps_of(channels, lost, base.delay_s, begin),
         clipped=sum(int(beyond.sum()) for beyond in clipped),
         at_limit=at_limit,
@@ -256,38 +263,3 @@ def _check_columns(shot: Capture, base: BaseModel) -> None:
                 f"shot {shot.cycle}: {choice.covariate!r} in shots.csv is {value!r}, and {choice.identifier} "
                 "goes by its numbers; write a number in each row, or leave the term out of the base model"
             )
-
-
-def _position_noise(position: Channel, clean: Samples) -> tuple[float, bool]:
-    """Noise of a position, or of the speed that it was summed up from, and whether it is stated.
-
-    A mean of two speeds has a third difference of weights 1/2, -1, 0, 1 and -1/2: an eighth of the variance
-    that it would have of white noise.
-    """
-    if position.summed_up:
-        if position.speed_noise_std is not None:
-            return position.speed_noise_std, True
-        step_s = np.diff(position.time_s)
-        # Decimals were lost where the position was largest: by so much are speeds of one raster off it.
-        rounded_at = float(np.abs(clean).max() / step_s.min())
-        return math.sqrt(8.0) * white_noise_std(np.diff(clean) / step_s + rounded_at), False
-    if position.noise_std is not None:
-        return noise_std(position), True
-    return white_noise_std(clean), False
-
-
-def _force_noise(force: Channel, clean: Samples, step_s: float) -> tuple[float, float]:
-    """Noise of a force in a record with so small steps, and values of the record that one sample makes.
-
-    On the line between two samples noise has two thirds of a sample's variance in the mean, but its values go
-    together: m of them, of one sample, add up to m times its error, as if each had sqrt(m) times that by
-    itself. Rows average over many. So it is where a force stays the same for m values. Levels that were
-    chosen are no raster.
-    """
-    slower = max(float(np.median(np.diff(force.time_s))) / step_s, 1.0)
-    held = samples_held(clean)
-    if force.noise_std is None:
-        noise = drive_noise_std(clean)
-    else:
-        noise = force.noise_std if is_command(clean) else noise_std(force) * math.sqrt(held)
-    return noise * math.sqrt(slower), held * slower

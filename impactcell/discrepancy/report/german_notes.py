@@ -257,6 +257,13 @@ NOTES: Final[Patterns] = (
     (r"delay_s comes to rest at (\S+ s), the end of what the base model allows: .*",
      (r"delay_s bleibt bei \1 stehen, am Ende dessen, was das Grundmodell zulässt: Zu prüfen ist, ob Kraft "
       "und Position eine Uhr haben; sonst delay_s ein größeres std geben.")),
+    ((r"Simulated open loop, the model follows held-out records to (\S+ \w+), and neighbouring samples "
+      r"differ by a noise of (\S+): .* state (\w+) in .*"),
+     (r"Ohne Rückführung simuliert folgt das Modell zurückgehaltenen Messungen auf \1, und benachbarte "
+      r"Messwerte rauschen um \2: Rauschen, das von Messwert zu Messwert anhält, oder eine Kamera oder ein "
+      r"Nullpunkt, der wandert, lässt ebenso viel übrig. Das Teil eine Weile in Ruhe aufzeichnen. Scheint es "
+      r"sich auch da zu bewegen, \3 in campaign.yaml angeben: die Standardabweichung in Ruhe mal "
+      r"sqrt((1 + r) / (1 - r)), r die Korrelation eines Messwerts mit dem nächsten.")),
     (r"Simulated open loop, held-out records are (\S+ .+?) off with it, (\S+) without\.",
      r"Ohne Rückführung simuliert liegen zurückgehaltene Messungen mit ihm um \1 daneben, ohne um \2."),
 )  # fmt: skip
