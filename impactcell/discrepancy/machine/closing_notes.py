@@ -146,9 +146,9 @@ def _note_of_wandering(finding: MachineFinding) -> list[str]:
     key, unit = COLUMNS[finding.base.coordinate]["position_noise"], finding.base.unit
     note = (
         f"Simulated open loop, the model follows held-out records to {simulated.rmse:.3g} {unit}, and "
-        f"neighbouring samples differ by a noise of {noise:.3g}: noise that goes on from sample to sample, "
-        "or a camera or zero that drifts, leaves as much. Record the part at rest for a while. If it seems to "
-        f"move there, too, state {key} in campaign.yaml: the standard deviation at rest times "
+        f"neighbouring samples differ by a noise of {noise:.3g}: noise that goes on from sample to "
+        "sample, or a camera or zero that drifts, leaves as much. Record the part at rest for a while. If it "
+        f"seems to move there, too, state {key} in campaign.yaml: the standard deviation at rest times "
         "sqrt((1 + r) / (1 - r)), r the correlation of one sample with the next."
     )
     return [note]
