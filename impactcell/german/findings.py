@@ -96,6 +96,21 @@ def enumerated(names: Sequence[str], conjunction: str) -> str:
     return f"{', '.join(first)} {conjunction} {last}" if first else last
 
 
+def enumerated_names(names: Sequence[str], conjunction: str) -> str:
+    """Names of effects in a row: adjectives stand small but where a sentence may begin with one.
+
+    >>> enumerated_names(["Viskose Reibung", "Lastabhängige Reibung", "Hysterese vor dem Gleiten"], "oder")
+    'Viskose Reibung, lastabhängige Reibung oder Hysterese vor dem Gleiten'
+    """
+    return enumerated([*names[:1], *map(_within_a_sentence, names[1:])], conjunction)
+
+
+def _within_a_sentence(name: str) -> str:
+    """Write an adjective small: a word with an ending of one, before a noun or before another of them."""
+    is_adjective = re.match(r"\w+(?:e|er|es) (?:[A-ZÄÖÜ]|[a-zäöü]{3,}(?:e|er|es) )", name)
+    return name[:1].lower() + name[1:] if is_adjective else name
+
+
 def with_decimal_commas(text: str) -> str:
     """Write the numbers of a text as German does.
 
@@ -130,6 +145,10 @@ def german_headline(result: Mapping[str, Any]) -> str:
         case "untested":
             counts = _counts(result)
             said = f"Die Messungen reichen für keine Aussage{counts}; Abweichung des Modells: {before}."
+            if hints := result.get("remaining", {}).get("hints"):
+                names = enumerated_names([*map(german_effect, hints)], "oder")
+                said = f"Nichts ist benannt, doch die Stärke ist von 0 verschieden ({names}); "
+                said += f"Abweichung des Modells: {before}."
         case "no_gap":
             said = f"Das Modell erklärt die Messungen: Abweichung {before}."
         case "unknown":
@@ -138,7 +157,7 @@ def german_headline(result: Mapping[str, Any]) -> str:
                 what = f", was angepasste Messungen zeigen und zurückgehaltene nicht: Abweichung {before}"
             said = f"Kein bekannter Effekt erklärt{what}{_where(result)}."
             if result.get("unconfirmed"):
-                names = enumerated([*map(german_effect, result["unconfirmed"])], "und")
+                names = enumerated_names([*map(german_effect, result["unconfirmed"])], "und")
                 why = "zurückgehaltene bestätigen es nicht"
                 if "without repeated settings held-out shots" in result.get("headline", ""):
                     why = "ohne Wiederholungen können zurückgehaltene es nicht bestätigen"
@@ -196,7 +215,7 @@ def _follows(simulation: Mapping[str, Any] | None) -> str:
     )
     if better := simulation.get("better_with"):
         rmse = simulation["rmse"]["after"], better["rmse"]
-        names = enumerated([*map(german_effect, better["effects"])], "oder")
+        names = enumerated_names([*map(german_effect, better["effects"])], "oder")
         said = f"{german_better_sentence(names, rmse, simulation['unit'])} {said}"
     return f" {said}".rstrip()
 
@@ -214,11 +233,11 @@ def _outdone(result: Mapping[str, Any]) -> str:
 
 def _missing(result: Mapping[str, Any]) -> str:
     groups = [
-        " oder ".join(map(german_effect, (effect["effect"], *effect.get("tied_with", ()))))
+        enumerated_names([*map(german_effect, (effect["effect"], *effect.get("tied_with", ())))], "oder")
         for effect in result["effects"]
     ]
     is_tied = any(effect.get("tied_with") for effect in result["effects"])
-    return enumerated(groups, "und") + (" (diese Messungen unterscheiden es nicht)" if is_tied else "")
+    return enumerated_names(groups, "und") + (" (diese Messungen unterscheiden es nicht)" if is_tied else "")
 
 
 def _where(result: Mapping[str, Any]) -> str:

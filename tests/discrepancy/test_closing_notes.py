@@ -72,7 +72,7 @@ def test_a_damping_that_only_the_simulation_shows_is_told() -> None:
     assert "noise_std_rad" in note
     language, german = german_machine_sentences.note(note)
     assert language == "de"
-    assert all(german_machine_sentences.phrase(name) in german for name in better.names)
+    assert all(german_machine_sentences.phrase(name).lower() in german.lower() for name in better.names)
     numbers = f"{better.rmse:.3g} rad".replace(".", ",")
     for said in (german, german_machine_sentences.headline(finding), german_headline(result)):
         assert numbers in said
@@ -96,8 +96,9 @@ def test_a_damping_below_the_noise_is_told_by_its_strength() -> None:
     assert not any("blocks do not show it" in note for note in result["notes"])
     language, german = german_machine_sentences.note(note)
     assert language == "de"
-    for said in (german, german_machine_sentences.headline(finding)):
-        assert all(german_machine_sentences.phrase(name) in said for name in strengths)
+    for said in (german, german_machine_sentences.headline(finding), german_headline(result)):
+        for name in strengths:
+            assert german_machine_sentences.phrase(name).lower() in said.lower()
 
 
 def test_of_a_film_without_damping_nothing_is_told() -> None:

@@ -60,7 +60,7 @@ def test_a_tie_and_a_name_are_told_as_what_they_are(ties: tuple[str, ...]) -> No
         (
             ["adhesion", "surface_tilt", "hertz_contact"],
             "adhesion, surface tilt and Hertz contact; with them the held-out gap falls from 3.00 to 1.00",
-            "Haften beim Trennen, Neigung des Tisches und Hertzscher Kontakt; damit fällt die Abweichung",
+            "Haften beim Trennen, Neigung des Tisches und hertzscher Kontakt; damit fällt die Abweichung",
         ),
     ],
 )

@@ -11,7 +11,7 @@ from impactcell.discrepancy.report.german_sentences import equation, in_german, 
 from impactcell.discrepancy.report.german_words import phrase as channel_name
 from impactcell.discrepancy.report.german_words import term_name as phrase
 from impactcell.discrepancy.report.machine_sentences import law_equation, noise_keys, why_not_named
-from impactcell.german.findings import enumerated
+from impactcell.german.findings import enumerated, enumerated_names
 from impactcell.german.open_loop import german_better_sentence, german_open_loop_sentence
 from impactcell.physics.effect_names import as_title
 
@@ -47,7 +47,7 @@ def headline(finding: MachineFinding) -> str:
     """Say what is established and what remains."""
     before, after = finding.fall.before, finding.fall.after
     if finding.verdict == "untested" and finding.clear_strengths and not finding.noise_is_motion:
-        names = enumerated([phrase(one.name) for one in finding.clear_strengths], "oder")
+        names = enumerated_names([phrase(one.name) for one in finding.clear_strengths], "oder")
         said = (
             f"Nichts ist benannt: Die Abweichung von {before:.2f} Rauschschwellen ist an ihrer Grenze, und "
             f"doch ist die Stärke von 0 verschieden ({names}). Länger, mit weniger Rauschen oder eine "
@@ -79,18 +79,18 @@ def headline(finding: MachineFinding) -> str:
     elif finding.verdict == "unknown":
         said = f"Kein bekannter Term erklärt eine Abweichung von {before:.2f} Rauschschwellen"
         if finding.unconfirmed:
-            names = enumerated([*map(phrase, finding.unconfirmed)], "und")
+            names = enumerated_names([*map(phrase, finding.unconfirmed)], "und")
             said = f"{names} würde angepasste Messungen erklären, zurückgehaltene bestätigen es nicht"
         why = reason(finding.steps[0].reason)[1] if finding.steps else ""
         said = f"{said}: {why}." if why else f"{said}."
     else:
         groups = [
-            " oder ".join(map(phrase, (name, *finding.tied_with.get(name, ()))))
+            enumerated_names([*map(phrase, (name, *finding.tied_with.get(name, ())))], "oder")
             for name in finding.established
         ]
         tied = " (diese Messungen unterscheiden es nicht)" if any(finding.tied_with.values()) else ""
         said = (
-            f"Es fehlt: {enumerated(groups, 'und')}{tied}; an zurückgehaltenen Messungen fällt die "
+            f"Es fehlt: {enumerated_names(groups, 'und')}{tied}; an zurückgehaltenen Messungen fällt die "
             f"Abweichung von {before:.2f} auf {after:.2f} Rauschschwellen."
         )
         if not finding.is_at_floor:
@@ -115,7 +115,7 @@ def headline(finding: MachineFinding) -> str:
             )
     errors, better = finding.simulated, finding.better_simulated
     if better is not None:
-        rmse, names = (errors[-1].rmse, better.rmse), enumerated([*map(phrase, better.names)], "oder")
+        rmse, names = (errors[-1].rmse, better.rmse), enumerated_names([*map(phrase, better.names)], "oder")
         said += f" {german_better_sentence(names, rmse, finding.base.unit)}"
     fit = errors[-1].fit_percent
     follows = german_open_loop_sentence(channel_name(finding.base.response), fit)

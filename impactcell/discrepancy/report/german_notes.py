@@ -11,7 +11,7 @@ from impactcell.discrepancy.report.german_held_numbers import column_slip, held_
 from impactcell.discrepancy.report.german_patterns import Patterns, marked, translated
 from impactcell.discrepancy.report.german_words import phrase, term_name
 from impactcell.german.data_faults import german_data_fault, german_message
-from impactcell.german.findings import enumerated
+from impactcell.german.findings import enumerated_names
 from impactcell.physics.effect_names import as_title, identifier_of
 
 AT_REST: Final = {"before contact": "vor dem Kontakt", "after the tap": "nach dem Stoß"}
@@ -281,7 +281,7 @@ def _terms(names: str) -> str:
 
 def _any_of(names: str) -> str:
     """Name terms of which one is enough."""
-    return enumerated([*map(_terms, re.split(", | or ", names))], "oder")
+    return enumerated_names([*map(_terms, re.split(", | or ", names))], "oder")
 
 
 def _parts(english: str) -> str:

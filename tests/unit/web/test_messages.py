@@ -124,7 +124,7 @@ FOUND = {
     [
         ({}, "Es fehlt: Quadratischer Widerstand; damit fällt die Abweichung von 8,78 auf 1,07."),
         ({"effects": [{"effect": "quadratic_drag", "tied_with": ["viscous_friction"]}]},
-         "Quadratischer Widerstand oder Viskose Reibung (diese Messungen unterscheiden es nicht)"),
+         "Quadratischer Widerstand oder viskose Reibung (diese Messungen unterscheiden es nicht)"),
         ({"remaining": {"explained": False, "share": 0.12, "where": [{"phase": "stop"}]}},
          "12 % der Abweichung bleiben (Phase: Stillstand)."),
         ({"verdict": "no_gap"}, "Das Modell erklärt die Messungen: Abweichung 8,78."),
