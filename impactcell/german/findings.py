@@ -73,6 +73,25 @@ ENGLISH_STEPS: Final = {
 """Steps whose own name is that of a command."""
 
 
+GERMAN_TERMS: Final = {
+    "coulomb_friction": "Coulombsche Reibung",
+    "directional_viscous_friction": "Richtungsabhängige viskose Reibung",
+    "load_dependent_friction": "Lastabhängige Reibung",
+    "covariate_friction": "Reibung je Einflussgröße",
+    "covariate_force": "Kraft je Einflussgröße",
+    "periodic_force": "Periodische Kraft",
+    "hardening_spring": "Verhärtende Feder",
+    "gravity_torque": "Schweremoment",
+    "presliding_hysteresis": "Hysterese vor dem Gleiten",
+    "friction_over_speed": "Reibung über der Geschwindigkeit",
+    "friction_over_load": "Reibung über der Last",
+    "friction_over_position": "Reibung über dem Ort",
+    "force_over_position": "Kraft über dem Ort",
+    "force_over_speed": "Kraft über der Geschwindigkeit",
+}
+"""Terms and free forms of a machine that the library of effects does not have."""
+
+
 def german_effect(identifier: str) -> str:
     """Name an effect; one of a base model, or of somebody's own, as it is called.
 
@@ -81,7 +100,7 @@ def german_effect(identifier: str) -> str:
     """
     german = german_texts(identifier)
     words = re.sub(r"^friction over column ", "Reibung über der Spalte ", in_words(identifier))
-    return words if german is None else german.name
+    return GERMAN_TERMS.get(identifier, words) if german is None else german.name
 
 
 def german_texts(identifier: str) -> German | None:

@@ -2,11 +2,11 @@
 
 from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.finding import MachineFinding, MachineLaw
+from impactcell.discrepancy.machine.law_terms import term_of
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.model_forces import resistance
 from impactcell.discrepancy.machine.proof import fall_of_gap
 from impactcell.discrepancy.machine.rival_forms import SPLINE_PIECES
-from impactcell.discrepancy.machine.selection import MIN_SHARE_OF_FREE
 from impactcell.discrepancy.machine.trials import TermSearch
 from impactcell.discrepancy.search import MAX_EXPECTED_GAP
 
@@ -49,22 +49,26 @@ def refusal_of(finding: MachineFinding, law: MachineLaw, tests: int) -> str:
     return ""
 
 
-def listed_instead(fits: MachineFits, finding: MachineFinding, law: MachineLaw) -> str:
-    """Name a term of the catalogue that does as well as a law beside a number left free; empty if none does.
+def listed_instead(fits: MachineFits, finding: MachineFinding) -> str:
+    """Name a term of the catalogue that leaves nothing beside a number left free; empty if none does.
 
-    The search for names had that number held, where nothing of the catalogue may stand out.
+    The search for names had that number held, where nothing of the catalogue may stand out. A term with a
+    shape is as free as a law is, and no simpler.
     """
     training, held_out = fits.blocks()
     own = finding.final.terms
     search = TermSearch(training, fits.candidates, fits.shapes, fits.priors, fits.nonnegative)
     columns = fits.columns(own)
     before = search.losses(columns)
-    best = max((search.best_shape(one, columns, before) for one in fits.candidates), key=lambda one: one.gain)
+    looked_at = {trial.term.choice for step in finding.steps for trial in step.trials}
+    simple = [choice for choice in fits.candidates if choice in looked_at and term_of(choice).shape is None]
+    if not simple:
+        return ""
+    best = max((search.best_shape(one, columns, before) for one in simple), key=lambda one: one.gain)
     without, with_it = (fits.fit(terms, settle=False) for terms in (own, (*own, best.term)))
     fall = fall_of_gap(held_out, without, with_it, finding.seed)
-    closed = law.fall.before**2 - law.fall.after**2
-    does_as_well = fall.before**2 - fall.after**2 >= MIN_SHARE_OF_FREE * closed
-    return best.term.choice.name if fall.is_real and does_as_well else ""
+    is_all = fall.is_real and fall.after <= held_out.largest_by_chance
+    return best.term.choice.name if is_all else ""
 
 
 def _inertia_left(law: MachineLaw) -> float:

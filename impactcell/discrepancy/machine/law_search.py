@@ -76,7 +76,7 @@ def with_law(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
         freed.append(outcome)
         fits = fits.with_freed(outcome)
         outcome = _find_law(fits, finding)
-    listed = listed_instead(fits, finding, outcome) if freed and isinstance(outcome, MachineLaw) else ""
+    listed = listed_instead(fits, finding) if freed and isinstance(outcome, MachineLaw) else ""
     if listed:
         outcome = (
             f"{in_words(listed)} beside {freed[0].phrase} does as well as any law; {freed[0].keys} would tell"

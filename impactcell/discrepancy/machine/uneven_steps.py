@@ -16,7 +16,7 @@ def at_equal_steps(times: Samples, values: Samples, at: Samples) -> Samples:
     Examples
     --------
     >>> times = np.array([0.0, 1.0, 2.0, 4.0, 5.0])
-    >>> at_equal_steps(times, times**3, np.arange(6.0)).tolist()
+    >>> at_equal_steps(times, times**3, np.arange(6.0)).round(9).tolist()
     [0.0, 1.0, 8.0, 27.0, 64.0, 125.0]
     """
     lines: Samples = np.interp(at, times, values)

@@ -3,7 +3,13 @@
 from typing import Final
 
 from impactcell.discrepancy.machine import LAW_PLACES
-from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, GERMAN_STATES, german_texts
+from impactcell.german.findings import (
+    GERMAN_PHASES,
+    GERMAN_QUANTITIES,
+    GERMAN_STATES,
+    GERMAN_TERMS,
+    german_texts,
+)
 from impactcell.physics.effect_names import in_words
 
 WORDS: Final = {
@@ -28,23 +34,6 @@ WORDS: Final = {
     "estimated": "geschätzt",
 }
 """Phases, channels, covariates and verdicts, by their names in the workflow."""
-TERMS: Final = {
-    "coulomb_friction": "Coulombsche Reibung",
-    "directional_viscous_friction": "Richtungsabhängige viskose Reibung",
-    "load_dependent_friction": "Lastabhängige Reibung",
-    "covariate_friction": "Reibung je Einflussgröße",
-    "covariate_force": "Kraft je Einflussgröße",
-    "periodic_force": "Periodische Kraft",
-    "hardening_spring": "Verhärtende Feder",
-    "gravity_torque": "Schweremoment",
-    "presliding_hysteresis": "Hysterese vor dem Gleiten",
-    "friction_over_speed": "Reibung über der Geschwindigkeit",
-    "friction_over_load": "Reibung über der Last",
-    "friction_over_position": "Reibung über dem Ort",
-    "force_over_position": "Kraft über dem Ort",
-    "force_over_speed": "Kraft über der Geschwindigkeit",
-}
-"""Terms and free forms of a machine that the library of effects does not have."""
 
 
 def phrase(identifier: str) -> str:
@@ -63,7 +52,7 @@ def term_name(name: str) -> str:
     'Gesetz: Reibung über der Last (u^2)'
     """
     identifier, _, column = name.partition("(")
-    said = TERMS.get(identifier) or phrase(identifier)
+    said = GERMAN_TERMS.get(identifier) or phrase(identifier)
     if identifier in LAW_PLACES:
-        said = f"Gesetz: {TERMS[LAW_PLACES[identifier]]}"
+        said = f"Gesetz: {GERMAN_TERMS[LAW_PLACES[identifier]]}"
     return f"{said} ({column}" if column else said
