@@ -1,7 +1,6 @@
 """What is said of a finding once it is done: by simulation, and where a number rests at its bound."""
 
 import math
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -34,8 +33,6 @@ FOLLOWS_PERCENT = 90.0
 FEW_NOISES = 4.0
 """Error of a simulated position over the noise that neighbouring samples show, up to which it may be noise of
 which neighbours share much: correlated by 0.7 it is 2.4 times what they show. Our choice."""
-EXPLAINED = re.compile(r" would (?:explain|take) \d+ % of what remains: ")
-"""In a note: something else is told that explains what remains."""
 
 
 def with_closing_notes(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
@@ -140,8 +137,7 @@ def _note_of_wandering(finding: MachineFinding) -> list[str]:
         return []
     simulated, noise = finding.simulated[-1], max(record.position_noise for record in records)
     is_small = simulated.rmse <= max(FEW_NOISES, finding.fall.after) * noise
-    is_explained = any(map(EXPLAINED.search, finding.notes))
-    if not is_small or is_explained or simulated.fit_percent < FOLLOWS_PERCENT:
+    if not is_small or finding.is_told_of or simulated.fit_percent < FOLLOWS_PERCENT:
         return []
     key, unit = COLUMNS[finding.base.coordinate]["position_noise"], finding.base.unit
     note = (

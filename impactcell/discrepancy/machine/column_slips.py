@@ -14,7 +14,6 @@ from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.regression import blocks_of, fit_blocks
 from impactcell.discrepancy.machine.simulation import simulate_held_out, with_simulations
-from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import Column, Rows, build_rows
 from impactcell.german.findings import enumerated
@@ -169,7 +168,7 @@ def _slips(fits: MachineFits, *, is_driven: bool, is_followed: bool) -> Iterator
 
 def _turned(fits: MachineFits) -> frozenset[int]:
     """Find records each of which, by itself, leaves less to the base model with its force turned."""
-    terms = [ChosenTerm(choice, fits.shapes[choice.name][0]) for choice in fits.base.terms]
+    terms = fits.base_terms
     shapes = {term.choice: (term.shape,) for term in terms}
     losses = []
     for sign in (1.0, -1.0):

@@ -8,6 +8,7 @@ from itertools import takewhile
 from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.evidence import FallOfGap
 from impactcell.discrepancy.machine.explained_by_numbers import (
+    Explained,
     absent_gravity_notes,
     blamed_on_number,
     explained_by,
@@ -48,7 +49,7 @@ def establish(
     The rows are weighed by what the base model leaves of them while terms are looked for; what is found is
     proved once more with weights by its own remainder, so that gaps before and after have the same ones.
     """
-    base_terms = tuple(ChosenTerm(choice, fits.shapes[choice.name][0]) for choice in fits.base.terms)
+    base_terms = fits.base_terms
     for turn in range(1, MOST_WEIGHINGS + 1):
         before, base_terms = base_terms, fits.with_best_shapes(base_terms)
         fits.weigh(fits.fit(base_terms, settle=True))
@@ -94,15 +95,14 @@ def establish(
         # Blocks are linear in the delay about that of the base model, which took over what the terms explain.
         final = fits.fit(final.terms, settle=True)
         settled = fits.blocks()
-    number_off = ""
+    explained: list[Explained] = []
     if enough:
         search = _search(fits, training, ())
         tried = [explained_by(search, fits.columns(final.terms), number) for number in numbers]
         explained = [one for one in tried if one is not None]
         notes = [*notes, *held_number_notes(explained)]
         steps = blamed_on_number(steps, explained)
-        most = explains_most(explained)
-        number_off = "" if most is None else most.number.name
+    most = explains_most(explained)
     finding = MachineFinding(
         base=fits.base,
         records=fits.records,
@@ -123,11 +123,13 @@ def establish(
         scale=fits.scale,
         notes=tuple(notes),
         seed=seed,
-        number_off=number_off,
+        is_told_of=bool(explained),
+        number_off="" if most is None else most.number.name,
     )
     if finding.is_at_floor or fits.base.force_offset_by_record:
         return finding
-    return replace(finding, notes=(*notes, *constants_note(finding.remainder.constant_share)))
+    said = constants_note(finding.remainder.constant_share)
+    return replace(finding, notes=(*notes, *said), is_told_of=finding.is_told_of or bool(said))
 
 
 def _search(fits: MachineFits, training: Blocks, candidates: Sequence[TermChoice]) -> TermSearch:

@@ -180,6 +180,8 @@ class MachineFinding:
         Terms beside what is established where the gap is at its floor, that which simulates best first.
     tied_models : mapping
         By the name of a tied term, the final model with it in the place of the named one.
+    is_told_of : bool
+        Whether what remains is told to be a number of the base model, or a constant of each record.
     number_off : str
         Number that the base model holds and that would explain most of what remains; empty where none does.
     """
@@ -210,6 +212,7 @@ class MachineFinding:
     better_simulated: BetterSimulation | None = None
     clear_strengths: tuple[ClearStrength, ...] = ()
     tied_models: Mapping[str, FittedModel] = field(default_factory=dict)
+    is_told_of: bool = False
     number_off: str = ""
 
     @staticmethod

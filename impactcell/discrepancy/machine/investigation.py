@@ -25,7 +25,6 @@ from impactcell.discrepancy.machine.release import from_release
 from impactcell.discrepancy.machine.simulation import with_simulations
 from impactcell.discrepancy.machine.terms import CATALOGUE
 from impactcell.discrepancy.machine.tied_models import with_tied_models
-from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
 from impactcell.discrepancy.machine.whole_turns import without_wraps
 from impactcell.errors import CampaignError
@@ -114,8 +113,7 @@ def zero_of_angle(fits: MachineFits) -> float:
     """Zero of the angle by the base model alone, from where it is counted; 0 where it is not free."""
     if ("position_offset", 0.0, 0) not in fits.priors:
         return 0.0
-    terms = tuple(ChosenTerm(choice, fits.shapes[choice.name][0]) for choice in fits.base.terms)
-    return fits.fit(terms, settle=False).nuisance("position_offset")
+    return fits.fit(fits.base_terms, settle=False).nuisance("position_offset")
 
 
 def _established(fits: MachineFits, notes: list[str], seed: int) -> MachineFinding:

@@ -153,6 +153,11 @@ class MachineFits:
         chosen = self.plan.rows_of(rows, training)
         return SmoothForce(rows, chosen, training.pieces, self.priors, self.nonnegative)
 
+    @property
+    def base_terms(self) -> tuple[ChosenTerm, ...]:
+        """Terms of the base model, each at the first value of its shape."""
+        return tuple(ChosenTerm(choice, self.shapes[choice.name][0]) for choice in self.base.terms)
+
     def columns(self, terms: Iterable[ChosenTerm]) -> list[Column]:
         """Columns of a model: its free nuisances and its terms."""
         return [*self.priors, *(column for term in terms for column in term.columns)]
@@ -213,8 +218,9 @@ class MachineFits:
 
         Where the delay is free, by what it leaves at its own; the delay that blocks are built at stays.
         """
-        self.stiffness = model.value(SPRING)
-        self._rows.cache_clear()
+        if model.value(SPRING) != self.stiffness:
+            self.stiffness = model.value(SPRING)
+            self._rows.cache_clear()
         built_at = self.gravity, self.delay_s
         if not self.base.delay_s.is_held:
             self._settle(model.terms)

@@ -16,13 +16,12 @@ from impactcell.records import Samples
 
 PERIODS_PER_SUPPORT = 0.25
 """Support of a test function over the period of the motion: a half swing has four rows [1]."""
-MOST_PERIODS_PER_SUPPORT = 1.0
-"""And at most, where noise wants it: two thirds of a sine are left then, a 32nd of white noise [1]."""
 MAX_ACCELERATION_NOISE = 0.003
 """Noise of a row's acceleration over the largest one down to which supports are made wider where nothing
 drives, and a motion has no more than its period: what slows a bob is a hundredth of its weight [1]."""
-WIDER = math.sqrt(2.0)
-"""By how much at a time [1]."""
+WIDER, WIDENINGS = math.sqrt(2.0), 4
+"""By how much at a time [1], and how often at most: to a whole period, which leaves two thirds of a sine
+and a 32nd of white noise."""
 SPEED_SUPPORT_SHARE = 0.25
 """Support by which a speed is smoothed at most, over that of a test function: direction turns fast [1]."""
 MIN_SPEED_SUPPORT = 3
@@ -199,16 +198,18 @@ def _half_support(record: UniformRecord, scale: MotionScale) -> int:
     """Half of the least support at which a row's acceleration is quiet enough, or of the widest [samples]."""
     largest = 2.0 * math.pi * scale.speed / scale.period_s
     periods = PERIODS_PER_SUPPORT
-    while True:
-        half = max(int(0.5 * periods * scale.period_s / record.step_s), MIN_HALF_SUPPORT)
-        wider = WIDER * periods
-        if record.force.any() or wider > MOST_PERIODS_PER_SUPPORT * WIDER**0.5:
-            return half
+    half = _half_of(periods, record, scale)
+    for _ in range(0 if record.force.any() else WIDENINGS):
         _, curvature = test_function(half, record.step_s)
-        noise = record.noise[0] * math.sqrt(record.noise_gain(curvature))
-        if noise <= MAX_ACCELERATION_NOISE * largest:
-            return half
-        periods = wider
+        if record.noise[0] * math.sqrt(record.noise_gain(curvature)) <= MAX_ACCELERATION_NOISE * largest:
+            break
+        periods *= WIDER
+        half = _half_of(periods, record, scale)
+    return half
+
+
+def _half_of(periods: float, record: UniformRecord, scale: MotionScale) -> int:
+    return max(int(0.5 * periods * scale.period_s / record.step_s), MIN_HALF_SUPPORT)
 
 
 def widening(records: Sequence[UniformRecord], scale: MotionScale) -> float:

@@ -39,7 +39,7 @@ REASONS: Final[Patterns] = (
      lambda m: f"{said} erklärt es so gut wie jede Funktion von Geschwindigkeit, Last oder Ort"
      if (said := held_number(m[1])) else ""),
     (r"(.+) beside (an?\w* .+) does as well as any law",
-     lambda m: f"neben: {said} erklärt es „{term_name(identifier_of(m[1]))}“ so gut wie jedes Gesetz"
+     lambda m: f"„{term_name(identifier_of(m[1]))}“, dazu {said}, erklärt es so gut wie jedes Gesetz"
      if (said := held_number(m[2])) else ""),
     ((r"(\w+[^;]* among the nuisances of the base model(?: or a free \w+)?|"
       r"a free \w+(?: above 0)? in the base model) would tell"),
