@@ -1,5 +1,6 @@
 """One look at a live module: who it is, what it says, and one tap of it; nothing is acknowledged."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -16,6 +17,9 @@ from impactcell.records import Capture, CycleId
 
 IDENTITY: Final = ("module_name", "serial_number", "map_version", "firmware_version")
 """Registers that say who the module is, where the map has them."""
+
+MOST_LOOKS: Final = 5
+"""Looks at the newest cycle where each time a newer one takes its place: taps come no faster than reading."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,17 +68,7 @@ async def probe(module: ModuleAcquisition) -> ProbeResult:
             await module.close()
             status = await module.connect_once()
         identity = (await module.register_client.read_image(IDENTITY)).values
-        capture: Capture | None = None
-        faults: tuple[str, ...] = ()
-        if status.cycle_counter in status.ring and status.cycle_counter:
-            capture, faults = await _newest(module, status)
-        elif status.cycle_counter:
-            held = ", ".join(str(cycle) for cycle in status.ring[:4])
-            what = f"cycle_counter shows {status.cycle_counter}, but ring_cycle {held} ..."
-            way_out = (
-                f"one of them has another address, type or word order than in map {module.registers.name}"
-            )
-            faults = (f"{module.cell}: {what}: {way_out}",)
+        status, capture, faults = await _newest(module, status)
         round_trip_s = module.status.round_trip_s
         window = str(module.register_client.modbus.window)
         identification = await _identification(module)
@@ -89,12 +83,31 @@ async def _identification(module: ModuleAcquisition) -> Mapping[str, str]:
         return {}
 
 
-async def _newest(module: ModuleAcquisition, status: StatusBlock) -> tuple[Capture | None, tuple[str, ...]]:
-    counter = status.cycle_counter
-    cycle_id = CycleId(status.session, counter)
-    target = NextCapture(cycle_id, status.ring.index(counter), counter, missed=0, restarted=False)
+async def _newest(
+    module: ModuleAcquisition, status: StatusBlock
+) -> tuple[StatusBlock, Capture | None, tuple[str, ...]]:
+    """Read the newest cycle, or the next that takes its place meanwhile; with the status that has it."""
     reader = CaptureReader(module.cell, module.register_client)
-    fetched = await reader.fetch(target, TakenCycles(None, 0, module.registers.slots, reader.numbers))
-    if isinstance(fetched, NotFetched):
-        return None, (f"{module.cell}: cycle {counter}: {fetched.value}",)
-    return fetched.capture if fetched.readable else None, fetched.faults
+    taken = TakenCycles(None, 0, module.registers.slots, reader.numbers)
+    for looks in itertools.count(1):
+        counter = status.cycle_counter
+        if not counter:
+            break
+        if counter not in status.ring:
+            return status, None, (_not_in_the_ring(module, status),)
+        cycle_id = CycleId(status.session, counter)
+        target = NextCapture(cycle_id, status.ring.index(counter), counter, missed=0, restarted=False)
+        fetched = await reader.fetch(target, taken)
+        if not isinstance(fetched, NotFetched):
+            return status, fetched.capture if fetched.readable else None, fetched.faults
+        if fetched is not NotFetched.OVERWRITTEN or looks == MOST_LOOKS:
+            return status, None, (f"{module.cell}: cycle {counter}: {fetched.value}",)
+        status = await module.read_status()
+    return status, None, ()
+
+
+def _not_in_the_ring(module: ModuleAcquisition, status: StatusBlock) -> str:
+    held = ", ".join(str(cycle) for cycle in status.ring[:4])
+    what = f"cycle_counter shows {status.cycle_counter}, but ring_cycle {held} ..."
+    way_out = f"one of them has another address, type or word order than in map {module.registers.name}"
+    return f"{module.cell}: {what}: {way_out}"

@@ -14,6 +14,7 @@ import yaml
 from impactcell.errors import MapError, ModbusExceptionError
 from impactcell.fieldbus.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.map_promises import not_promised
+from impactcell.fieldbus.probe import probe
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.german.link_faults import german_link_fault
 from impactcell.records import CycleId
@@ -53,6 +54,34 @@ def make_summary(device: ScriptedDevice, cycles: int = 1) -> None:
     for _ in range(cycles):
         cycle = (int(device.get("cycle_counter")) + 1) % 65_536
         device.complete({}, velocity=0.05, batch_id="B-17", **figures_of(cycle))
+
+
+@pytest.mark.parametrize("newer", [1, 4, 100])
+async def test_probe_looks_again_where_a_newer_tap_took_the_place_of_the_newest(newer: int) -> None:
+    device = ScriptedDevice(ONE_BUFFER, session=9)
+    make_buffer(device)
+
+    def tap_meanwhile() -> None:
+        make_buffer(device)
+        if int(device.get("cycle_counter")) <= newer:
+            device.on_read.append(at_header)
+
+    at_header = (ONE_BUFFER["window_cycle"].address, tap_meanwhile)
+    device.on_read.append(at_header)
+    async with running(ONE_BUFFER, device) as (_, module, _receptions):
+        result = await probe(module)
+    if newer < 100:
+        assert result.capture is not None
+        assert result.capture.force is not None
+        assert (result.capture.cycle, result.faults) == (result.status.cycle_counter, ()) == (1 + newer, ())
+        np.testing.assert_allclose(result.capture.force.values, samples_of(1 + newer)["force"], atol=0.0126)
+    else:  # it ends, and says why
+        assert result.capture is None
+        assert int(device.get("cycle_counter")) < 20
+        (fault,) = result.faults
+        assert fault == (
+            f"cell-1: cycle {result.status.cycle_counter}: the module has put a newer cycle in its place"
+        )
 
 
 @pytest.mark.parametrize("max_registers", [125, 33])
