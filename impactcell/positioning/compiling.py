@@ -23,11 +23,11 @@ def compile_planning() -> None:
     part, place = np.array([20.0, 9.81]), np.array([0.0, 1.0])
     lookahead = build_lookahead(limits, posterior, part, place)
     value = lookahead.outlook.value(limits, 1.0, 2e-3)
-    space = limits.space(posterior, part, lookahead.strokes)
+    space = limits.space(posterior, part, place, lookahead.strokes)
     select_action(
         2e-3, lookahead.table, value, space,
         parameter_scenarios(posterior, Z, part, place), Goal(50e-6, 100.0), 0.1,
     )  # fmt: skip
     tap = Tap(0.02, 2e-4)
     model_of_tap(tap, posterior, part)
-    largest_force(tap.velocity_m_s, tap.stroke_m, stiffest(posterior), 20.0, 9.81)
+    largest_force(tap.velocity_m_s, tap.stroke_m, stiffest(posterior, part, place), 20.0, 9.81)

@@ -3,11 +3,13 @@
 The part moves by D instead of the model's D_0 (Kennedy and O'Hagan, 2001)::
 
     D = D_0(stroke + delta psi(tap) · w) exp(phi(tap) · w) + delta beta(tap) · w,   w ~ N(0, W)
+    ln mu_k = ln mu_k(0) - xi(place) · w
 
 and the weights w are learned with the parameters, as one Gaussian. phi acts on what slides freely, which is
 off by a share of itself; psi on the indentation delta = mu_k m g / k, whose error is one of the stroke: it
 shows in a push as it is, in a strike not at all; beta on where the part only just moves, a stroke of about
-delta, where the model may know nothing of how friction builds up. With u = sqrt(2 mu_k g f D_0), the speed
+delta, where the model may know nothing of how friction builds up; xi on friction itself: where it is higher,
+less slides and the indentation is deeper, as the model has it. With u = sqrt(2 mu_k g f D_0), the speed
 at which the part leaves the actuator::
 
     f = (D_0 - (stroke - delta)) / D_0     share that slides, 0 to 1
@@ -21,7 +23,9 @@ from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 
 FEATURES = 14
-"""Weights of the discrepancy: one a line of phi, psi or beta."""
+"""Weights of the discrepancy: one a line of phi, psi, beta or xi."""
+POSITION, POSITION_BY_MASS = 3, 4
+"""Weights of a friction that goes with the place, as a share of friction and as a force of its own."""
 INDENTATION = 5
 """Weight by which the indentation is off."""
 BREAKAWAY = 11
@@ -36,6 +40,8 @@ MASS_KG = 15.0
 """In the middle of what a cell handles: the discrepancy is told against it."""
 POSITION_M = 0.02
 """Over which a discrepancy of the position grows to its weight."""
+FAR = 3.0
+"""So many times `POSITION_M` from 0 it grows more slowly."""
 WIDTH = 0.5
 """Of the neighbourhood of a stroke, in its logarithm: some 50 % up and down."""
 BEYOND = 1.0
@@ -74,6 +80,16 @@ def halting_m(displacement: float, stroke: float) -> float:
 
 
 @compiled
+def position_feature(position: float) -> float:
+    """Return what a friction that goes with the place goes with, at a position in m.
+
+    Proportional to it near 0; like its logarithm far away, since cells count from anywhere, and friction
+    there is not to be beyond all bounds before the first tap.
+    """
+    return FAR * math.asinh(position / (FAR * POSITION_M))
+
+
+@compiled
 def discrepancy_features(
     tap: Samples, displacement: float, part: Samples, place: Samples, out: Samples
 ) -> None:
@@ -96,12 +112,13 @@ def discrepancy_features(
         return
     speed = math.sqrt(2.0 * tap[2] * part[1] * f * displacement) / SPEED_M_S
     lighter = MASS_KG / part[0]
-    along = f * (place[0] + 0.5 * place[1] * displacement) / POSITION_M
+    middle = place[0] + place[1] * (1.0 - 0.5 * f) * displacement
+    along = f * (position_feature(middle) - position_feature(place[0]))
     out[0] = f
     out[1] = f * math.log(max(speed, 0.05))
     out[2] = -f * math.log(lighter)
-    out[3] = along
-    out[4] = along * lighter
+    out[POSITION] = along
+    out[POSITION_BY_MASS] = along * lighter
     out[8] = f * min(LOSS_M / displacement, 1.0) * lighter
     out[9] = f * place[1]
     out[10] = f * speed * lighter
@@ -109,18 +126,20 @@ def discrepancy_features(
 
 @compiled
 def indentation_features(velocity: float, part: Samples, place: Samples, out: Samples) -> None:
-    """Write psi of the taps at this velocity (m/s) to `out`, shape (FEATURES,); otherwise as above.
-
-    Friction that is higher somewhere slows what slides and deepens the indentation: it has one weight.
-    """
+    """Write psi of the taps at this velocity (m/s) to `out`, shape (FEATURES,); otherwise as above."""
     out[:] = 0.0
-    lighter = MASS_KG / part[0]
-    out[3] = place[0] / POSITION_M
-    out[4] = out[3] * lighter
     out[5] = 1.0
-    out[6] = -math.log(lighter)
+    out[6] = math.log(part[0] / MASS_KG)
     out[7] = math.log(velocity / VELOCITY_M_S)
     out[9] = place[1]
+
+
+def friction_features(part: Samples, place: Samples) -> Samples:
+    """Return xi, shape (FEATURES,): where the part lies, ln mu_k is lower by xi · w than at 0."""
+    xi = np.zeros(FEATURES)
+    xi[POSITION] = position_feature(place[0])
+    xi[POSITION_BY_MASS] = xi[POSITION] * MASS_KG / part[0]
+    return xi
 
 
 @compiled
@@ -140,7 +159,7 @@ DEPENDS_ON = {
     "slide": (0,),
     "velocity": (1, 7, 10),
     "mass": (2, 6),
-    "position": (3, 4),
+    "position": (POSITION, POSITION_BY_MASS),
     "contact": (5, 8, 11, 12, 13),
     "direction": (9,),
 }

@@ -33,6 +33,7 @@ from impactcell.positioning.planner_posterior import (
     STIFFNESS,
     VISCOUS,
     PlannerPosterior,
+    known_at,
 )
 from impactcell.positioning.scatter_hypotheses import quantile_scales
 from impactcell.records import Samples
@@ -77,7 +78,7 @@ class Scenarios(NamedTuple):
 
 def parameter_scenarios(posterior: PlannerPosterior, z: Samples, part: Samples, place: Samples) -> Scenarios:
     """Draw up what a tap of this part at this place may meet, along the line at the nodes z."""
-    cov = posterior.cov.copy()
+    mean, cov = known_at(posterior, part, place)
     scales = quantile_scales(posterior.mixed_scatter, z)
     scatter = scales[:, 0]
     known = cov[FRICTION, FRICTION]
@@ -96,7 +97,7 @@ def parameter_scenarios(posterior: PlannerPosterior, z: Samples, part: Samples, 
     weights_along *= ACROSS_Z
     variances, axes = np.linalg.eigh(weights_left)
     theta = np.empty((z.size + 2 * ACROSS, PARAMETERS + FEATURES))
-    theta[:] = posterior.mean
+    theta[:] = mean
     theta[: z.size] += z[:, None] * along
     # ln(1 + s z) to second order: a factor of friction is normal, not log-normal
     theta[: z.size, FRICTION] -= 0.5 * np.minimum(sigma, WIDEST_CORRECTED) ** 2 * z**2

@@ -17,7 +17,7 @@ def force_needed(limits: PlannerLimits, posterior: PlannerPosterior, part: Sampl
     `impactcell.positioning.displacement_quantiles.Scenarios`.
     """
     lookahead = build_lookahead(replace(limits, max_force_n=math.inf), posterior, part, place)
-    plant, moved = stiffest(posterior), lookahead.table[:, :, COARSE_Z.size // 2]
+    plant, moved = stiffest(posterior, part, place), lookahead.table[:, :, COARSE_Z.size // 2]
     forces = [
         largest_force(velocity, stroke, plant, part[0], part[1])
         for velocity, displacements in zip(limits.velocities, moved, strict=True)

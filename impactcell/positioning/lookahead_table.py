@@ -8,14 +8,19 @@ import numpy as np
 
 from impactcell.numerics.raster import ANY_VALUE, Raster
 from impactcell.positioning.action_selection import ActionSpace
-from impactcell.positioning.displacement_discrepancy import FEATURES, MASS_KG, POSITION_M
+from impactcell.positioning.displacement_discrepancy import FEATURES, MASS_KG, position_feature
 from impactcell.positioning.displacement_quantiles import (
     parameter_scenarios,
     plant_parameters,
     quantile_table,
 )
 from impactcell.positioning.dynamic_programming import Goal, ValueFunction, solve_value_function
-from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior, anticipate_learning
+from impactcell.positioning.planner_posterior import (
+    PARAMETERS,
+    PlannerPosterior,
+    anticipate_learning,
+    known_at,
+)
 from impactcell.positioning.quadrature import COARSE_Z, coarse_nodes
 from impactcell.positioning.safety_limits import allowed_strokes
 from impactcell.positioning.scatter_hypotheses import quantile_scales
@@ -110,16 +115,21 @@ class PlannerLimits:
         """Tolerance, and what an overshoot may cost."""
         return Goal(self.tolerance_m, self.penalty(caution))
 
-    def longest_strokes(self, velocities: Samples, posterior: PlannerPosterior, part: Samples) -> Samples:
+    def longest_strokes(
+        self, velocities: Samples, posterior: PlannerPosterior, part: Samples, place: Samples
+    ) -> Samples:
         """Longest stroke at each velocity that the limit of force allows."""
         if math.isinf(self.max_force_n):
             return np.full(velocities.size, math.inf)
-        return allowed_strokes(velocities, self.max_force_n, stiffest(posterior), part[0], part[1])
+        plant = stiffest(posterior, part, place)
+        return allowed_strokes(velocities, self.max_force_n, plant, part[0], part[1])
 
-    def space(self, posterior: PlannerPosterior, part: Samples, strokes: Samples) -> ActionSpace:
+    def space(
+        self, posterior: PlannerPosterior, part: Samples, place: Samples, strokes: Samples
+    ) -> ActionSpace:
         """Taps to choose from."""
         velocities = self.velocities
-        longest = self.longest_strokes(velocities, posterior, part)
+        longest = self.longest_strokes(velocities, posterior, part, place)
         return ActionSpace(velocities, strokes, longest, self.velocity_raster, self.stroke_raster)
 
 
@@ -220,13 +230,15 @@ class LookaheadTable:
     def _other(self, place: Samples) -> float:
         """Discrepancy of another place less that of the table's own, relative."""
         along, by_mass, direction = self.knowledge.mean[PARAMETERS + np.array([3, 4, 9])]
-        way = (along + by_mass * MASS_KG / self.part[0]) * (place[0] - self.place[0]) / POSITION_M
+        further = position_feature(place[0]) - position_feature(self.place[0])
+        way = (along + by_mass * MASS_KG / self.part[0]) * further
         return float(way + direction * (place[1] - self.place[1]))
 
 
-def stiffest(posterior: PlannerPosterior) -> Samples:
+def stiffest(posterior: PlannerPosterior, part: Samples, place: Samples) -> Samples:
     """Plant (k, b, mu_s, mu_k, k_v) that presses hardest, within three standard deviations."""
-    worst = posterior.mean + 3.0 * np.sqrt(np.diag(posterior.cov))
+    mean, cov = known_at(posterior, part, place)
+    worst = mean + 3.0 * np.sqrt(np.diag(cov))
     plant: Samples = plant_parameters(worst[None])[0] * np.array([1.0, 1.0, 1.1, 1.1, 1.0])
     return plant
 
@@ -242,7 +254,7 @@ def build_lookahead(
 
     What comes later is told again only where much more is known: it has been planned with learning anyway.
     """
-    indentation, knowledge = indentation_of(posterior, part), knowledge_of(posterior)
+    indentation, knowledge = indentation_of(posterior, part, place), knowledge_of(posterior)
     strokes = limits.strokes(indentation)
     table = _quantiles(limits, strokes, posterior, part, place)
     if before is not None and near(knowledge, before.outlook.knowledge, OUTLOOK_LASTS):
@@ -258,9 +270,10 @@ def build_lookahead(
     return LookaheadTable(part, place, knowledge, strokes, table, *shares, outlook)
 
 
-def indentation_of(posterior: PlannerPosterior, part: Samples) -> float:
-    """Return the static indentation delta (m) of a part that is pushed."""
-    plant = plant_parameters(posterior.mean[None])[0]
+def indentation_of(posterior: PlannerPosterior, part: Samples, place: Samples) -> float:
+    """Return the static indentation delta (m) of a part that is pushed where it lies."""
+    mean, _ = known_at(posterior, part, place)
+    plant = plant_parameters(mean[None])[0]
     return float(plant[3] * part[0] * part[1] / plant[0])
 
 
@@ -280,5 +293,5 @@ def _quantiles(
     velocities = limits.velocities
     scenarios = parameter_scenarios(posterior, COARSE_Z, part, place)
     table = quantile_table(velocities, strokes, scenarios, COARSE_Z)
-    table[strokes > limits.longest_strokes(velocities, posterior, part)[:, None]] = math.nan
+    table[strokes > limits.longest_strokes(velocities, posterior, part, place)[:, None]] = math.nan
     return table

@@ -230,9 +230,9 @@ class TapPlanner:
         """
         questions.check_is_tap(tap)
         questions.check_mass(mass_kg)
-        return largest_force(
-            tap.velocity_m_s, tap.stroke_m, stiffest(self._posterior), mass_kg, self._gravity
-        )
+        place = np.array([tap.position_m, float(tap.direction)])
+        plant = stiffest(self._posterior, self._part(mass_kg), place)
+        return largest_force(tap.velocity_m_s, tap.stroke_m, plant, mass_kg, self._gravity)
 
     def _choose(
         self, distance: float, part: Samples, place: Samples, room: float = math.inf
@@ -241,7 +241,7 @@ class TapPlanner:
         lookahead = self._lookahead(part, place)
         if not lookahead.furthest_m > 0.0:
             return unmoved(self._limits, self._posterior, part, place)
-        space = self._limits.space(self._posterior, part, lookahead.strokes)
+        space = self._limits.space(self._posterior, part, place, lookahead.strokes)
         scenarios = parameter_scenarios(self._posterior, Z, part, place)
 
         def stays(velocity: float, strokes: Samples) -> NDArray[np.bool_]:

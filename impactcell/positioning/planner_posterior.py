@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from impactcell.positioning.displacement_discrepancy import FEATURES
+from impactcell.positioning.displacement_discrepancy import FEATURES, friction_features
 from impactcell.positioning.displacement_discrepancy import LEARNED_STD as LEARNED_WEIGHTS_STD
 from impactcell.positioning.prediction_watch import PredictionWatch
 from impactcell.positioning.scatter_hypotheses import mean_variances, prior_weights
@@ -119,6 +119,19 @@ def with_single_gaussian(posterior: PlannerPosterior, mean: Samples, cov: Sample
         scatter_weights=posterior.mixed_scatter[None],
         hypotheses=np.zeros(1),
     )
+
+
+def known_at(posterior: PlannerPosterior, part: Samples, place: Samples) -> tuple[Samples, Samples]:
+    """Mean and covariance with the friction that there is where the part lies, in place of that at 0.
+
+    `part` and `place` as in `impactcell.positioning.displacement_quantiles.Scenarios`.
+    """
+    xi = friction_features(part, place)
+    mean, cov = posterior.mean, posterior.cov
+    mean[FRICTION] -= xi @ mean[PARAMETERS:]
+    cov[FRICTION] -= xi @ cov[PARAMETERS:]
+    cov[:, FRICTION] -= cov[:, PARAMETERS:] @ xi
+    return mean, cov
 
 
 def prior_of_plant(

@@ -181,6 +181,7 @@ def update_component(
     size = mean.size
     regressed = np.zeros((PARAMETERS + 2, size + 1))
     regressed[np.arange(PARAMETERS), np.arange(PARAMETERS)] = 1.0
+    regressed[FRICTION, PARAMETERS:size] = -model.easing
     regressed[PARAMETERS, size] = 1.0
     regressed[PARAMETERS + 1, PARAMETERS:size] = model.indenting
     before = np.append(mean, 0.0)

@@ -10,11 +10,12 @@ from impactcell.positioning.displacement_discrepancy import (
     FEATURES,
     breakaway_features,
     discrepancy_features,
+    friction_features,
     halting_m,
     indentation_features,
 )
 from impactcell.positioning.displacement_quantiles import plant_parameters
-from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior
+from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior, known_at
 from impactcell.positioning.tap import Tap
 from impactcell.records import Samples
 
@@ -27,19 +28,21 @@ Response = Callable[[Samples], Samples]
 
 
 class TapModel(NamedTuple):
-    """Response to a tap, phi, psi and beta of its discrepancy, the indentation delta (m), and `halting_m`."""
+    """Response to a tap, phi, psi, beta and xi of its discrepancy, the indentation delta (m), `halting_m`."""
 
     response: Response
     features: Samples = NO_FEATURES
     indenting: Samples = NO_FEATURES
     breakaway: Samples = NO_FEATURES
+    easing: Samples = NO_FEATURES
     indentation_m: float = 0.0
     halting_m: float = 0.0
 
 
 def model_of_tap(tap: Tap, posterior: PlannerPosterior, part: Samples) -> TapModel:
     """Model of a tap on a part; `part` as in `impactcell.physics.closed_form.displacements`."""
-    mean = posterior.mean
+    place = np.array([tap.position_m, float(tap.direction)])
+    mean, _ = known_at(posterior, part, place)
     plant = plant_parameters(mean[None, :PARAMETERS])[0]
     indentation = float(plant[3] * part[0] * part[1] / plant[0])
 
@@ -51,11 +54,12 @@ def model_of_tap(tap: Tap, posterior: PlannerPosterior, part: Samples) -> TapMod
 
     features, indenting, breakaway = np.empty(FEATURES), np.empty(FEATURES), np.zeros(FEATURES)
     breakaway_features(tap.velocity_m_s, tap.stroke_m, indentation, breakaway)
-    place = np.array([tap.position_m, float(tap.direction)])
     indentation_features(tap.velocity_m_s, part, place, indenting)
     shift = float(indenting @ mean[PARAMETERS:])
     median = np.concatenate([mean[:PARAMETERS], [0.0, shift]])[None]
     commanded = np.array([tap.stroke_m + indentation * shift, indentation, plant[3]])
     moved = float(response(median)[0])
     discrepancy_features(commanded, moved, part, place, features)
-    return TapModel(response, features, indenting, breakaway, indentation, halting_m(moved, tap.stroke_m))
+    easing = friction_features(part, place)
+    halting = halting_m(moved, tap.stroke_m)
+    return TapModel(response, features, indenting, breakaway, easing, indentation, halting)

@@ -5,16 +5,24 @@ import math
 import numpy as np
 import pytest
 
+from impactcell.positioning import Tap, TapPlanner
+from impactcell.positioning.displacement_band import BAND_Z, displacement_band
 from impactcell.positioning.displacement_discrepancy import (
     BREAKAWAY,
     DEPENDS_ON,
     FEATURES,
+    POSITION,
+    POSITION_BY_MASS,
     breakaway_features,
     discrepancy_features,
+    friction_features,
     halting_m,
     indentation_features,
     largest_weight,
+    position_feature,
 )
+from impactcell.positioning.planner_posterior import PARAMETERS, prior_of_plant, with_single_gaussian
+from simulator.plant import Plant, TapInput, simulate_tap
 
 PART = np.array([15.0, 9.81])
 
@@ -25,10 +33,14 @@ def features(stroke: float, displacement: float, position: float = 0.0, directio
     return out
 
 
-def indenting(velocity: float = 0.03, position: float = 0.0, mass: float = 15.0) -> np.ndarray:
+def indenting(velocity: float = 0.03) -> np.ndarray:
     out = np.empty(FEATURES)
-    indentation_features(velocity, np.array([mass, 9.81]), np.array([position, 1.0]), out)
+    indentation_features(velocity, PART, np.array([0.0, 1.0]), out)
     return out
+
+
+def easing(position: float, mass: float = 15.0) -> np.ndarray:
+    return friction_features(np.array([mass, 9.81]), np.array([position, 1.0]))
 
 
 def breakaway(stroke: float, velocity: float = 0.03) -> np.ndarray:
@@ -55,15 +67,60 @@ def test_only_what_slides_ahead_of_an_actuator_that_then_halts_is_unsure_of_it()
 
 def test_position_counts_from_halfway_along_the_slide_and_direction_by_its_sign() -> None:
     there, back = features(1e-3, 20e-3, 5e-3, 1.0), features(1e-3, 20e-3, 5e-3, -1.0)
-    assert there[3] / back[3] == pytest.approx(15.0 / -5.0)
-    assert there[9] == -back[9]
-    assert indenting(position=5e-3)[3] == pytest.approx(0.25)
+    slid = 20e-3 - 0.96e-3
+    halfway = 0.96e-3 + 0.5 * slid
+    for tap, sign in ((there, 1.0), (back, -1.0)):
+        further = position_feature(5e-3 + sign * halfway) - position_feature(5e-3)
+        assert tap[POSITION] == pytest.approx(slid / 20e-3 * further)
+        assert np.sign(tap[9]) == sign
+    assert easing(5e-3)[POSITION] == pytest.approx(0.25, rel=2e-3)
 
 
 def test_a_force_that_is_the_same_for_all_masses_weighs_on_light_parts() -> None:
-    light, heavy = indenting(position=20e-3, mass=7.5), indenting(position=20e-3, mass=30.0)
-    assert light[4] / heavy[4] == pytest.approx(4.0)
-    assert light[3] == heavy[3]
+    light, heavy = easing(20e-3, mass=7.5), easing(20e-3, mass=30.0)
+    assert light[POSITION_BY_MASS] / heavy[POSITION_BY_MASS] == pytest.approx(4.0)
+    assert light[POSITION] == heavy[POSITION]
+
+
+@pytest.mark.parametrize(("velocity", "stroke"), [(0.03, 1.2e-4), (0.05, 4e-4), (0.1, 1.5e-3)])
+@pytest.mark.parametrize(("mass", "position"), [(8.0, 0.01), (32.0, 0.02), (8.0, 0.03), (32.0, 0.035)])
+def test_friction_that_grows_along_the_way_is_one_weight_for_push_and_slide(
+    velocity: float, stroke: float, mass: float, position: float
+) -> None:
+    """Against the simulator's plant with such a friction: what one weight says of all taps everywhere."""
+    gradient, plant = 10.0, {"stiffness_n_per_m": 6.5e5, "damping_n_s_per_m": 465.0}
+    hidden = {"position_dependent_friction": {"gradient_per_m": gradient}}
+    moved = simulate_tap(
+        Plant(**plant, mu_s=0.2, mu_k=0.152, effects=hidden),
+        TapInput(velocity, mass, stroke, start_m=position, dwell_s=1.0, shot=1, shots=2, batch=0),
+    ).displacement_m
+    posterior = prior_of_plant(6.5e5, 465.0, 0.2, 0.152, 0.0)
+    mean = posterior.mean
+    mean[PARAMETERS + POSITION] = -math.log1p(gradient * 0.03) / position_feature(0.03)
+    knowing = with_single_gaussian(posterior, mean, np.diag(np.full(mean.size, 1e-10)))
+    part, place = np.array([mass, 9.81]), np.array([position, 1.0])
+    band = displacement_band(knowing, velocity, np.array([stroke]), part, place)[0]
+    indentation = 0.152 * mass * 9.81 / 6.5e5
+    assert abs(band[BAND_Z.size // 2] - moved) < 0.02 * indentation + 0.01 * moved
+
+
+@pytest.mark.parametrize("position", [0.0, 0.05, -0.3, 1.0, 3.0])
+def test_a_cell_may_count_its_positions_from_far_away(position: float) -> None:
+    planner = TapPlanner(tolerance_m=50e-6)
+    tap = planner.next_tap(position + 0.02 - position, 20.0, position)
+    assert isinstance(tap, Tap)
+    planner.observe(tap, tap.expected_m, 20.0)
+    assert isinstance(planner.next_tap(0.02 - tap.expected_m, 20.0, position + tap.expected_m), Tap)
+
+
+def test_a_force_is_bounded_for_the_friction_where_the_part_lies() -> None:
+    planner = TapPlanner(tolerance_m=50e-6)
+    mean = planner.posterior.mean
+    mean[PARAMETERS + POSITION] = -0.3
+    std = np.full(mean.size, 1e-6)
+    planner.resume(with_single_gaussian(planner.posterior, mean, np.diag(std**2)))
+    here, there = (planner.force(Tap(0.01, 1e-3, position_m=x), 30.0) for x in (0.0, 0.04))
+    assert there > 1.05 * here
 
 
 def test_breakaway_counts_where_the_stroke_is_about_the_indentation() -> None:

@@ -52,7 +52,7 @@ def test_a_table_from_before_more_was_learned_leads_to_no_longer_stroke() -> Non
     posterior = TapPlanner(plant=NOMINAL).posterior
     part, place = np.array([13.0, 9.81]), np.array([0.0, 1.0])
     lookahead = build_lookahead(limits, posterior, part, place)
-    before = limits.space(posterior, part, lookahead.strokes)
+    before = limits.space(posterior, part, place, lookahead.strokes)
     space = before._replace(longest_strokes=0.8 * before.longest_strokes)
     value = lookahead.outlook.value(limits, 1.0, 10e-3)
     scenarios = parameter_scenarios(posterior, Z, part, place)
