@@ -26,6 +26,8 @@ FEATURES = 14
 """Weights of the discrepancy: one a line of phi, psi, beta or xi."""
 POSITION, POSITION_BY_MASS = 3, 4
 """Weights of a friction that goes with the place, as a share of friction and as a force of its own."""
+DIRECTION = 9
+"""Weight of a friction that is higher one way."""
 INDENTATION = 5
 """Weight by which the indentation is off."""
 BREAKAWAY = 11
@@ -53,6 +55,8 @@ BREAKAWAY_SHARE = 0.3
 HALTING_STD = 0.08
 """Standard deviation of what no weight explains where a part slides ahead of an actuator that then halts: a
 share of `halting_m`, chosen on closed loops with an effect hidden."""
+SWING_SHARE = 0.04
+"""Share of a stroke by which the moment at which a push ends may be another than the model has it."""
 LOSS_M = 1e-3
 """Displacement beside which a loss of energy in the contact is told."""
 
@@ -77,6 +81,26 @@ def halting_m(displacement: float, stroke: float) -> float:
     if math.isinf(stroke) or not displacement > stroke:
         return 0.0
     return (displacement - stroke) * stroke / displacement
+
+
+@compiled
+def swing_m(before: float, displacement: float, after: float, stroke: float, indentation: float) -> float:
+    """Return by how much a displacement hangs on where in its swing a part is as the actuator halts, m.
+
+    A pushed part swings on the contact, so that what it is pushed depends on the moment at which the actuator
+    halts by some tenths of the indentation, beside the stroke itself. Whatever slows actuator or part, or
+    holds it a moment longer, moves that moment, and the longer the push, the further.
+
+    Parameters
+    ----------
+    before, displacement, after : float
+        Of the model at strokes shorter and longer by `SWING_SHARE`, and at the stroke, m.
+    """
+    if math.isinf(stroke) or not displacement > 0.0:
+        return 0.0
+    pushed = 1.0 - sliding_share(displacement, stroke, indentation)
+    way = SWING_SHARE * stroke * pushed
+    return max(abs(displacement - before - way), abs(after - displacement - way))
 
 
 @compiled
@@ -120,7 +144,7 @@ def discrepancy_features(
     out[POSITION] = along
     out[POSITION_BY_MASS] = along * lighter
     out[8] = f * min(LOSS_M / displacement, 1.0) * lighter
-    out[9] = f * place[1]
+    out[DIRECTION] = f * place[1]
     out[10] = f * speed * lighter
 
 
@@ -128,10 +152,10 @@ def discrepancy_features(
 def indentation_features(velocity: float, part: Samples, place: Samples, out: Samples) -> None:
     """Write psi of the taps at this velocity (m/s) to `out`, shape (FEATURES,); otherwise as above."""
     out[:] = 0.0
-    out[5] = 1.0
+    out[INDENTATION] = 1.0
     out[6] = math.log(part[0] / MASS_KG)
     out[7] = math.log(velocity / VELOCITY_M_S)
-    out[9] = place[1]
+    out[DIRECTION] = place[1]
 
 
 def friction_features(part: Samples, place: Samples) -> Samples:
@@ -161,7 +185,7 @@ DEPENDS_ON = {
     "mass": (2, 6),
     "position": (POSITION, POSITION_BY_MASS),
     "contact": (5, 8, 11, 12, 13),
-    "direction": (9,),
+    "direction": (DIRECTION,),
 }
 """Which weights speak of what."""
 

@@ -20,11 +20,14 @@ from impactcell.positioning.displacement_discrepancy import (
     BREAKAWAY_SHARE,
     FEATURES,
     HALTING_STD,
+    SWING_SHARE,
     breakaway_features,
     discrepancy_features,
     halting_m,
     indentation_features,
+    swing_m,
 )
+from impactcell.positioning.model_hypotheses import swing_std
 from impactcell.positioning.planner_posterior import (
     DAMPING,
     FRICTION,
@@ -66,6 +69,8 @@ class Scenarios(NamedTuple):
         Of the displacement and of the contact, at each node.
     part, place : ndarray
         As in `displacements` and in `discrepancy_features`.
+    swing_std : float
+        Of what the swing of a pushed part is off by, of `swing_m`.
     """
 
     plants: Samples
@@ -74,10 +79,16 @@ class Scenarios(NamedTuple):
     scatter: Samples
     part: Samples
     place: Samples
+    swing_std: float
 
 
-def parameter_scenarios(posterior: PlannerPosterior, z: Samples, part: Samples, place: Samples) -> Scenarios:
-    """Draw up what a tap of this part at this place may meet, along the line at the nodes z."""
+def parameter_scenarios(
+    posterior: PlannerPosterior, z: Samples, part: Samples, place: Samples, swing: float | None = None
+) -> Scenarios:
+    """Draw up what a tap of this part at this place may meet, along the line at the nodes z.
+
+    `swing` is `Scenarios.swing_std` where it is not the posterior's own.
+    """
     mean, cov = known_at(posterior, part, place)
     scales = quantile_scales(posterior.mixed_scatter, z)
     scatter = scales[:, 0]
@@ -114,6 +125,7 @@ def parameter_scenarios(posterior: PlannerPosterior, z: Samples, part: Samples, 
         np.ascontiguousarray(scales[:, 1:]),
         part,
         place,
+        swing_std(posterior) if swing is None else swing,
     )
 
 
@@ -162,6 +174,13 @@ def displacement_quantiles(
     longer_m = max(depth * math.sqrt(product(psi_root, psi_root)), SHORTEST_SHIFT_M)
     displacements(velocity, strokes + shift + longer_m, rows[middle], part, moved_other)
     slope = (moved_other - moved) * (depth / longer_m)  # of the displacement over psi · w
+    swings = np.zeros(count)
+    if scenarios.swing_std > 0.0:
+        before, after = np.empty(count), np.empty(count)
+        displacements(velocity, (1.0 - SWING_SHARE) * strokes + shift, rows[middle], part, before)
+        displacements(velocity, (1.0 + SWING_SHARE) * strokes + shift, rows[middle], part, after)
+        for j in range(count):
+            swings[j] = scenarios.swing_std * swing_m(before[j], moved[j], after[j], strokes[j], depth)
     add_discrepancy(moved, features, at_breakaway, weights[middle])
     out[:, middle] = moved
     for q in range(nodes):
@@ -192,7 +211,7 @@ def displacement_quantiles(
         line[:] = out[j]
         indented_m = max(abs(slope[j]), (1.0 - features[0, j]) * min(depth, line[middle]))
         indented_m = max(indented_m, BREAKAWAY_SHARE * at_breakaway[BREAKAWAY, j])
-        square[j] += (HALTING_STD * halting_m(line[middle], strokes[j])) ** 2
+        square[j] += (HALTING_STD * halting_m(line[middle], strokes[j])) ** 2 + swings[j] ** 2
         if math.isnan(square[j]):
             out[j] = math.nan
             continue

@@ -2,19 +2,26 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
 from impactcell.numerics.raster import ANY_VALUE, Raster
 from impactcell.positioning.action_selection import ActionSpace
-from impactcell.positioning.displacement_discrepancy import FEATURES, MASS_KG, position_feature
+from impactcell.positioning.displacement_discrepancy import (
+    DIRECTION,
+    MASS_KG,
+    POSITION,
+    POSITION_BY_MASS,
+    position_feature,
+)
 from impactcell.positioning.displacement_quantiles import (
     parameter_scenarios,
     plant_parameters,
     quantile_table,
 )
 from impactcell.positioning.dynamic_programming import Goal, ValueFunction, solve_value_function
+from impactcell.positioning.model_hypotheses import swing_std
+from impactcell.positioning.planner_knowledge import Knowledge, knowledge_of, near
 from impactcell.positioning.planner_posterior import (
     PARAMETERS,
     PlannerPosterior,
@@ -23,7 +30,6 @@ from impactcell.positioning.planner_posterior import (
 )
 from impactcell.positioning.quadrature import COARSE_Z, coarse_nodes
 from impactcell.positioning.safety_limits import allowed_strokes
-from impactcell.positioning.scatter_hypotheses import quantile_scales
 from impactcell.positioning.stated_limits import (
     LIMITS,
     check_limit,
@@ -42,8 +48,6 @@ NEAR = (0.3, 2.0)
 """Between which of its multiples a stroke is about the indentation."""
 MULTIPLIER = 0.15  # Lagrange multiplier of the bound on overshoot, times that bound
 SAME_MASS = 0.03  # relative difference of parts that share a table
-STALE = np.concatenate([[0.02, 0.04, 0.08, 0.03, 2.0], np.full(FEATURES, 0.03)])
-"""Change of the posterior's mean or standard deviation, in its units, after which a table is made anew."""
 STALE_PLACE = 0.01
 """Of a displacement or an indentation: by how much another place may differ before a table is made anew."""
 LEAST_OTHER_PLACE = 1e-3
@@ -57,10 +61,6 @@ MOST_GOALS = 12
 STILL_TO_LEARN = 0.02
 """Taps that the whole distance is worth beside what it costs: decides between taps that are otherwise alike,
 and is worth less than 2e-4 of an overshoot. Half a tap settles as fast, and overshoots more often."""
-SCATTER_Z = np.array([1.0, 3.0])
-"""Nodes at which scatter is compared."""
-STALE_SCATTER = np.array([[4e-3, 4e-3, 0.02], [6e-3, 6e-3, 0.04]])
-"""Change of the scatter at these nodes after which a table is made anew."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,29 +131,6 @@ class PlannerLimits:
         velocities = self.velocities
         longest = self.longest_strokes(velocities, posterior, part, place)
         return ActionSpace(velocities, strokes, longest, self.velocity_raster, self.stroke_raster)
-
-
-class Knowledge(NamedTuple):
-    """What a table hangs on: mean and standard deviation of the posterior, and the scatter at `SCATTER_Z`."""
-
-    mean: Samples
-    std: Samples
-    scatter: Samples
-
-
-def knowledge_of(posterior: PlannerPosterior) -> Knowledge:
-    """Return what a table made now would hang on."""
-    scatter = quantile_scales(posterior.mixed_scatter, SCATTER_Z)
-    return Knowledge(posterior.mean, np.sqrt(np.diag(posterior.cov)), scatter)
-
-
-def near(now: Knowledge, then: Knowledge, times: float) -> bool:
-    """Whether what is known now differs by less than so many times what makes a table stale."""
-    return bool(
-        (np.abs(now.scatter - then.scatter) < times * (STALE_SCATTER + 0.1 * then.scatter)).all()
-        and (np.abs(now.mean - then.mean) < times * STALE).all()
-        and (np.abs(now.std - then.std) < times * STALE).all()
-    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -229,7 +206,9 @@ class LookaheadTable:
 
     def _other(self, place: Samples) -> float:
         """Discrepancy of another place less that of the table's own, relative."""
-        along, by_mass, direction = self.knowledge.mean[PARAMETERS + np.array([3, 4, 9])]
+        along, by_mass, direction = self.knowledge.mean[
+            PARAMETERS + np.array([POSITION, POSITION_BY_MASS, DIRECTION])
+        ]
         further = position_feature(place[0]) - position_feature(self.place[0])
         way = (along + by_mass * MASS_KG / self.part[0]) * further
         return float(way + direction * (place[1] - self.place[1]))
@@ -262,7 +241,7 @@ def build_lookahead(
     else:
         later = anticipate_learning(posterior)
         will_learn = (np.diag(posterior.cov) > 1.2 * np.diag(later.cov)).any()
-        ahead = _quantiles(limits, strokes, later, part, place) if will_learn else table
+        ahead = _quantiles(limits, strokes, later, part, place, swing_std(posterior)) if will_learn else table
         if strokes.size == 1:
             ahead = np.ascontiguousarray(ahead.swapaxes(0, 1))  # neighbours are velocities, not strokes
         outlook = Outlook(knowledge, ahead)
@@ -288,10 +267,15 @@ def _shares(strokes: Samples, indentation: float, middle: Samples) -> tuple[Samp
 
 
 def _quantiles(
-    limits: PlannerLimits, strokes: Samples, posterior: PlannerPosterior, part: Samples, place: Samples
+    limits: PlannerLimits,
+    strokes: Samples,
+    posterior: PlannerPosterior,
+    part: Samples,
+    place: Samples,
+    swing: float | None = None,
 ) -> Samples:
     velocities = limits.velocities
-    scenarios = parameter_scenarios(posterior, COARSE_Z, part, place)
+    scenarios = parameter_scenarios(posterior, COARSE_Z, part, place, swing)
     table = quantile_table(velocities, strokes, scenarios, COARSE_Z)
     table[strokes > limits.longest_strokes(velocities, posterior, part, place)[:, None]] = math.nan
     return table

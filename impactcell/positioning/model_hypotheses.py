@@ -51,6 +51,8 @@ WEIGHTS_STD = np.array([0.002, 0.005, 0.025, 0.16])
 """Of the weights beforehand, under each hypothesis: relative to a displacement, or to an indentation."""
 VISCOUS_STD = np.array([0.0, 60.0, 4.0, 24.0])
 """Of k_v beforehand on top of what the model says, N s/m: as much as slows a light part by half."""
+SWING = np.array([0.0, 0.2, 0.5, 0.5])
+"""Standard deviation, in `swing_m`, of what the swing of a pushed part is off by under each hypothesis."""
 PROBABILITIES = np.array([0.72, 0.06, 0.15, 0.07])
 """Of the hypotheses before the first tap: most models are right but for friction; a choice."""
 COMPLETE = PROBABILITIES[0] * same_contact_by_displacement(PRIOR_WEIGHTS)
@@ -117,6 +119,14 @@ def join(
         scatter_weights=np.concatenate([part.scatter_weights for part in parts]),
         hypotheses=np.repeat(np.arange(float(len(parts))), [part.weights.size for part in parts]),
     )
+
+
+def swing_std(posterior: PlannerPosterior) -> float:
+    """Return the standard deviation of `SWING` over all hypotheses; 0 for a posterior that has one."""
+    probabilities = posterior.probabilities
+    if probabilities.size < SWING.size:
+        return 0.0
+    return math.sqrt(float(probabilities @ SWING**2))
 
 
 def reweighted(probabilities: Samples, log_evidence: Samples) -> Samples:

@@ -21,11 +21,11 @@ from impactcell.positioning.lookahead_table import (
     LookaheadTable,
     PlannerLimits,
     build_lookahead,
-    knowledge_of,
     stiffest,
 )
 from impactcell.positioning.model_hypotheses import tap_predictions, with_model_accepted
 from impactcell.positioning.nominal_plant import nominal_plant
+from impactcell.positioning.planner_knowledge import knowledge_of
 from impactcell.positioning.planner_posterior import PlannerPosterior
 from impactcell.positioning.prediction_watch import POSITION_NOISE_M
 from impactcell.positioning.quadrature import Z
@@ -242,7 +242,9 @@ class TapPlanner:
         if not lookahead.furthest_m > 0.0:
             return unmoved(self._limits, self._posterior, part, place)
         space = self._limits.space(self._posterior, part, place, lookahead.strokes)
-        scenarios = parameter_scenarios(self._posterior, Z, part, place)
+        scenarios = parameter_scenarios(
+            self._posterior, Z, part, place, model_hypotheses.swing_std(self._posterior)
+        )
 
         def stays(velocity: float, strokes: Samples) -> NDArray[np.bool_]:
             band = displacement_band(self._posterior, velocity, strokes, part, place)

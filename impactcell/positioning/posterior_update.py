@@ -26,6 +26,7 @@ from impactcell.positioning.mixture_components import (
     within_most_components,
 )
 from impactcell.positioning.model_hypotheses import (
+    SWING,
     join,
     parts_of,
     reweighted,
@@ -88,7 +89,11 @@ def update_posterior(
         Standard deviation with which a displacement is measured.
     """
     model = response if isinstance(response, TapModel) else TapModel(response)
-    updates = [update_hypothesis(part, model, moved_m, noise_m) for part in parts_of(posterior)]
+    parts = parts_of(posterior)
+    updates = [
+        update_hypothesis(part, model._replace(swing_m=std * model.swing_m), moved_m, noise_m)
+        for part, std in zip(parts, SWING if len(parts) == SWING.size else np.zeros(1), strict=True)
+    ]
     parts = [part for part, _ in updates]
     log_evidence = np.array([evidence for _, evidence in updates])
     probabilities = posterior.probabilities
@@ -189,7 +194,7 @@ def update_component(
     prior[:size, :size] = cov
     prior[size, size] = scatter[0]
     floor = np.diag(LEAST_STD**2)
-    unmodelled = noise_m**2 + (HALTING_STD * model.halting_m) ** 2
+    unmodelled = noise_m**2 + (HALTING_STD * model.halting_m) ** 2 + model.swing_m**2
     point, after = before.copy(), prior
     weight, surprise, likelihood, crooked = 1.0, 0.0, -math.inf, 0.0
     foretold, rest, reaches = 0.0, 1.0, np.zeros(3)

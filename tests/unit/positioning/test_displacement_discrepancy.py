@@ -13,6 +13,7 @@ from impactcell.positioning.displacement_discrepancy import (
     FEATURES,
     POSITION,
     POSITION_BY_MASS,
+    SWING_SHARE,
     breakaway_features,
     discrepancy_features,
     friction_features,
@@ -20,6 +21,7 @@ from impactcell.positioning.displacement_discrepancy import (
     indentation_features,
     largest_weight,
     position_feature,
+    swing_m,
 )
 from impactcell.positioning.planner_posterior import PARAMETERS, prior_of_plant, with_single_gaussian
 from simulator.plant import Plant, TapInput, simulate_tap
@@ -63,6 +65,15 @@ def test_only_what_slides_ahead_of_an_actuator_that_then_halts_is_unsure_of_it()
     assert halting_m(0.0, 1e-3) == 0.0
     assert halting_m(2e-3, 1e-3) == pytest.approx(0.5e-3)
     assert halting_m(20e-3, 1e-3) < 1e-3  # however far it slides
+
+
+def test_only_what_is_pushed_hangs_on_where_in_its_swing_it_is_let_go() -> None:
+    way = SWING_SHARE * 1e-3
+    assert swing_m(1e-3 - way, 1e-3, 1e-3 + way, 1e-3, 0.0) == pytest.approx(0.0, abs=1e-12)  # as pushed
+    assert swing_m(1e-3 - way, 1e-3, 1e-3 + way + 7e-6, 1e-3, 0.0) == pytest.approx(7e-6)
+    assert swing_m(1e-3 - way + 9e-6, 1e-3, 1e-3 + way, 1e-3, 0.0) == pytest.approx(9e-6)
+    assert swing_m(5e-3, 5e-3, 5e-3, math.inf, 40e-6) == 0.0  # struck
+    assert swing_m(0.0, 0.0, 1e-6, 30e-6, 40e-6) == 0.0
 
 
 def test_position_counts_from_halfway_along_the_slide_and_direction_by_its_sign() -> None:

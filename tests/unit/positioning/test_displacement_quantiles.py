@@ -1,5 +1,6 @@
 """The predictive distribution of a displacement, against the simulator's plant."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -147,3 +148,28 @@ def test_a_slide_ahead_of_a_halting_actuator_is_not_surer_than_friction_along_it
     furthest = (np.array([max(moved), min(moved)]) - middle) / (np.array([band.max(), band.min()]) - middle)
     assert (furthest > 1.0).all()  # it is not in the model
     assert (furthest * Z[-1] < 6.5).all()
+
+
+@pytest.mark.parametrize(("swing", "beyond"), [(0.0, (0.3, 1.0)), (1.0, (0.0, 0.01))])
+def test_a_push_is_as_uncertain_as_the_moment_at_which_it_ends(
+    swing: float, beyond: tuple[float, float]
+) -> None:
+    """The simulator's plant with a drive 3 % slower or faster: a part is let go elsewhere in its swing."""
+    posterior = prior_of_plant(6.5e5, 465.0, 0.2, 0.152, 0.0)
+    known = with_single_gaussian(posterior, posterior.mean, np.diag(np.full(posterior.mean.size, 1e-8)))
+    quiet = np.zeros((1, len(GRID)))
+    quiet[0, int(GRID.sum(axis=1).argmin())] = 1.0
+    known = replace(known, scatter_weights=quiet)
+    strokes, place, band, scores = (
+        np.geomspace(2e-4, 1.5e-3, 12),
+        np.array([0.0, 1.0]),
+        np.empty((12, 67)),
+        [],
+    )
+    for mass, velocity in itertools.product((12.0, 25.0, 38.0), np.geomspace(5e-3, 25e-3, 8)):
+        scenarios = parameter_scenarios(known, Z, np.array([mass, 9.81]), place, swing)
+        displacement_quantiles(velocity, strokes, scenarios, Z, band)
+        for other in (0.97 * velocity, 1.03 * velocity):
+            moved = nominal_taps(6.5e5, 465.0, 0.2, 0.152, mass, other, strokes).displacement_m
+            scores.append((moved - band[:, 33]) / np.ptp(band, axis=1))
+    assert beyond[0] <= np.mean(np.abs(scores) > 0.5) <= beyond[1]

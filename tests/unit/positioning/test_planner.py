@@ -231,7 +231,7 @@ def test_the_bound_on_overshoot_is_kept_by_the_true_distribution() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3, 5, 8])
+@pytest.mark.parametrize("seed", [2, 8, 9, 11])
 def test_after_a_tap_far_astray_the_bound_on_overshoot_holds_again(seed: int) -> None:
     """Friction has dropped by 30 % and nobody said so: the tap that meets it is foretold wrongly, no more."""
     rng = np.random.default_rng([seed, 5])
