@@ -166,8 +166,11 @@ def german_headline(result: Mapping[str, Any]) -> str:
             said = f"Die Messungen reichen für keine Aussage{counts}; Abweichung des Modells: {before}."
             if hints := result.get("remaining", {}).get("hints"):
                 names = enumerated_names([*map(german_effect, hints)], "oder")
-                said = f"Nichts ist benannt, doch die Stärke ist von 0 verschieden ({names}); "
-                said += f"Abweichung des Modells: {before}."
+                said = (
+                    f"Nichts ist benannt: Die Abweichung von {before} liegt am Rauschen der Sensoren, und "
+                    f"doch ist die Stärke von 0 verschieden ({names}). Länger, mit weniger Rauschen oder mit "
+                    "größerer Bewegung aufzeichnen."
+                )
         case "no_gap":
             said = f"Das Modell erklärt die Messungen: Abweichung {before}."
         case "unknown":
@@ -260,6 +263,9 @@ def _missing(result: Mapping[str, Any]) -> str:
 
 
 def _where(result: Mapping[str, Any]) -> str:
+    """Say in which phases of a tap something remains; a machine, which is judged in blocks, has none."""
+    if "blocks" in result:
+        return ""
     places = result.get("remaining", {}).get("where") or []
     if not places and result.get("unexplained"):
         places = [result["unexplained"]]

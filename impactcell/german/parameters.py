@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from impactcell.german.findings import GERMAN_TERMS
 from impactcell.physics.effect_names import in_words
 from impactcell.physics.effects import LIBRARY
 
@@ -15,6 +16,26 @@ PLANT: Final = {
 """Words and unit of the plant's own parameters."""
 UNIT_PARTS: Final = {"n", "m", "m2", "s", "s2", "rad", "per"}
 """What the unit at the end of a parameter's name is made of."""
+MACHINE_UNITS: Final = {
+    "n": "N",
+    "n_s_per_m": "N s/m",
+    "n_s2_per_m2": "N s²/m²",
+    "n_per_m": "N/m",
+    "n_per_m3": "N/m³",
+    "n_per_unit": "N/u",
+    "n_m": "N m",
+    "n_m_s_per_rad": "N m s/rad",
+    "n_m_s2_per_rad2": "N m s²/rad²",
+    "n_m_per_rad": "N m/rad",
+    "n_m_per_rad3": "N m/rad³",
+    "n_m_per_unit": "N m/u",
+    "m": "m",
+    "m_per_s": "m/s",
+    "rad": "rad",
+    "rad_per_s": "rad/s",
+    "s": "s",
+}
+"""Units of a machine's parameters, of a translation and of a rotation, by how they end a name."""
 GERMAN: Final = {
     "amplitude": "Amplitude",
     "asymmetric coefficient": "richtungsabhängiger Koeffizient",
@@ -81,6 +102,8 @@ def parameter_words(effect: str, name: str, language: str) -> tuple[str, str]:
 
     >>> parameter_words("stribeck_friction", "stribeck_velocity_m_s", "en")
     ('Stribeck velocity', 'm/s')
+    >>> parameter_words("viscous_friction", "viscous_coefficient_n_m_s_per_rad", "de")
+    ('viskoser Koeffizient', 'N m s/rad')
     >>> parameter_words("", "damping_n_s_per_m", "de")
     ('Dämpfung', 'N s/m')
     """
@@ -88,11 +111,22 @@ def parameter_words(effect: str, name: str, language: str) -> tuple[str, str]:
     return words_of(words, language), unit
 
 
+def without_unit(name: str) -> tuple[str, str]:
+    """Part a machine's parameter from the unit at its end; empty where it has none.
+
+    >>> without_unit("drag_coefficient_n_m_s2_per_rad2"), without_unit("load_coefficient")
+    (('drag_coefficient', 'N m s²/rad²'), ('load_coefficient', ''))
+    """
+    ends = (end for end in MACHINE_UNITS if name.endswith(f"_{end}"))
+    end = max(ends, key=len, default="")
+    return name.removesuffix(f"_{end}"), MACHINE_UNITS.get(end, "")
+
+
 def _of_effect(effect: str, name: str) -> tuple[str, str]:
     known = LIBRARY.get(effect)
     units = {} if known is None else {parameter.name: parameter.unit for parameter in known.parameters}
     if name not in units:
-        return name, ""
+        return without_unit(name) if known or effect in GERMAN_TERMS else (name, "")
     if units[name] == "1":
         return name, ""
     *words, last = name.split("_")

@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine import COVARIATES, LAW_PLACES, MachineFinding
-from impactcell.german.parameters import words_of
+from impactcell.german.parameters import without_unit, words_of
 
 SYMBOLS: Final = {
     Coordinate.TRANSLATION: {"force": "N", "F": "n", "q": "m"},
@@ -22,8 +22,6 @@ SLUGS: Final = {
     "1": "",
 }
 """How a unit ends a parameter's name."""
-SHAPE_SLUGS: Final = {"{q}": "{q}", "{q}/s": "{q}_per_s", "s": "s"}
-"""The same of shapes and of the delay."""
 NUISANCE_UNITS: Final = {
     "force_offset": "{F}",
     "gravity_torque": "{F}",
@@ -60,16 +58,10 @@ def machine_parameter_words(name: str, coordinate: Coordinate, language: str) ->
     symbols = SYMBOLS[coordinate]
     if name == "inertia":
         return words_of(name, language), INERTIA_UNITS[coordinate]
-    unit = NUISANCE_UNITS.get(name, "")
-    ends = {
-        slug.format(F=symbols["F"], q=symbols["q"]): told
-        for told, slug in (SLUGS | SHAPE_SLUGS).items()
-        if slug
-    }
-    for end in sorted(ends, key=len, reverse=True):
-        if not unit and name.endswith(f"_{end}"):
-            name, unit = name.removesuffix(f"_{end}"), ends[end]
-    return words_of(name, language), unit.format(F=symbols["force"], q=symbols["q"])
+    if name in NUISANCE_UNITS:
+        return words_of(name, language), NUISANCE_UNITS[name].format(F=symbols["force"], q=symbols["q"])
+    stem, unit = without_unit(name)
+    return words_of(stem, language), unit
 
 
 def parameter_rows(

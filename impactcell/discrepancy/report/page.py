@@ -62,6 +62,7 @@ def report_environment(said: ModuleType) -> Environment:
         p_value=lambda value: said.written(format_p_value(value)),
         grouped=lambda value, decimals: said.written(format_thousands(value, decimals)),
     )
+    environment.globals["percent_closed"] = percent_closed
     environment.globals["percent_range"] = lambda *interval: said.written(percent_range(*interval))
     return environment
 
@@ -90,15 +91,27 @@ def format_thousands(value: float, decimals: int) -> str:
     return f"{value:,.{decimals}f}".replace(",", " ")
 
 
+def percent_closed(closed: float) -> str:
+    """Write the share of a gap that is closed in per cent: of one that falls below its floor, all.
+
+    >>> percent_closed(0.953), percent_closed(1.82)
+    ('95 %', '100 %')
+    """
+    return f"{100.0 * min(closed, 1.0):.0f} %"
+
+
 def percent_range(low: float, high: float, to: str, more_than: str) -> str:
     """Write an interval of shares in per cent, with a decimal where its ends would look the same.
 
-    >>> shares = ((0.4, 0.92), (0.951, 0.953), (0.998, 1.0))
+    No more than all is closed: a gap that falls below its floor says nothing more.
+
+    >>> shares = ((0.4, 0.92), (0.951, 0.953), (0.998, 1.0), (0.82, 4.25))
     >>> [percent_range(*share, "to", "more than") for share in shares]
-    ['40 to 92', '95.1 to 95.3', 'more than 99']
+    ['40 to 92', '95.1 to 95.3', 'more than 99', '82 to 100']
     """
     if low >= ALL_CLOSED:
         return f"{more_than} {100.0 * ALL_CLOSED:.0f}"
+    high = min(high, 1.0)
     decimals = 0 if round(100.0 * low) != round(100.0 * high) else 1
     return f"{100.0 * low:.{decimals}f} {to} {100.0 * high:.{decimals}f}"
 

@@ -15,6 +15,7 @@ from impactcell.quantities import FOLDERS
 from impactcell.records import Estimator, Quality
 from impactcell.scada import Role
 from impactcell.web.alarm_pages import ACTIONS
+from impactcell.web.interface import Freshness
 from impactcell.web.messages import Messages
 from impactcell.web.page_context import THEMES
 from impactcell.web.past import SPANS_S
@@ -59,6 +60,7 @@ def test_no_text_is_left_over_or_missing() -> None:
         *(f"live_{estimator.value}" for estimator in Estimator),
         *(f"folder_{folder}" for folder in FOLDERS),
         *(f"stage_{stage.value}" for stage in Stage),
+        *(f"live_{freshness.value}" for freshness in Freshness),
         *(f"refused_{refusal.value}" for refusal in Refusal),
         *("refused_BadInvalidArgument", "refused_BadOutOfRange", "refused_other"),
         *(
@@ -130,6 +132,12 @@ FOUND = {
         ({"verdict": "no_gap"}, "Das Modell erklärt die Messungen: Abweichung 8,78."),
         ({"verdict": "unknown", "unexplained": {"phase": "free_slide"}},
          "Kein bekannter Effekt erklärt die Abweichung von 8,78 (Phase: freies Gleiten)."),
+        ({"verdict": "unknown", "unexplained": {"phase": "free_slide"}, "blocks": {"held_out": 8}},
+         "Kein bekannter Effekt erklärt die Abweichung von 8,78. (Abweichungen"),
+        ({"verdict": "untested",
+          "remaining": {"hints": ["coulomb_friction", "viscous_friction", "load_dependent_friction"]}},
+         ("doch ist die Stärke von 0 verschieden (Coulombsche Reibung, viskose Reibung oder lastabhängige "
+         "Reibung). Länger, mit weniger Rauschen oder mit größerer Bewegung aufzeichnen.")),
         ({"verdict": "unknown", "unconfirmed": ["mass_error"]}, "Falsche Masse würde"),
         ({"verdict": "unknown",
           "outdone": {"effect": "friction_patch", "form": "mu (1 + s(x))", "same_place": True}},
