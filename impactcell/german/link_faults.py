@@ -63,8 +63,7 @@ GERMAN: Final = {
     r"connection lost: (?P<system>.+)": r"Verbindung verloren: \g<system>",
     r"connection closed": "Verbindung geschlossen",
     r"not connected": "nicht verbunden",
-    r"not connected yet \(starting, compiling for this machine\)":
-        "noch nicht verbunden (startet, übersetzt für diese Maschine)",
+    r"not connected yet \(starting\)": "noch nicht verbunden (startet)",
     r"the connection was lost while several requests were in flight":
         "die Verbindung ging verloren, während mehrere Anfragen unterwegs waren",
     rf"no answer to {_REQUEST} within (?P<time>{_TIME})(?:, of \d+ in flight \(window \d+\))?":

@@ -3,6 +3,7 @@
 Apart from `jit`, so that who asks to be told need not load the compiler.
 """
 
+import threading
 from collections.abc import Callable
 from typing import Final
 
@@ -10,6 +11,7 @@ COMPILING: Final = "compiling for this machine, once: a minute or two, longer on
 """Said when machine code is missing, after an installation or an update."""
 
 _listeners: list[Callable[[], None]] = []
+_lacked = threading.Event()
 
 
 def on_compilation(listener: Callable[[], None]) -> None:
@@ -17,7 +19,13 @@ def on_compilation(listener: Callable[[], None]) -> None:
     _listeners[:] = [listener]
 
 
+def has_lacked_code() -> bool:
+    """Say whether this process has lacked machine code on disk: its start is then one that compiles."""
+    return _lacked.is_set()
+
+
 def announce_compilation() -> None:
-    """Tell who asked for it, once."""
+    """Tell who asked for it, once; from then on `has_lacked_code`."""
+    _lacked.set()
     if _listeners:
         _listeners.pop()()

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Final
 
-NOT_CONNECTED_YET: Final = "not connected yet (starting, compiling for this machine)"
+NOT_CONNECTED_YET: Final = "not connected yet (starting)"
 """Why there is no link before the first attempt has succeeded or failed."""
 
 

@@ -18,14 +18,7 @@ from impactcell.journal.audit_entries import AuditEntry
 from impactcell.positioning.task_state_machine import TaskOutcome
 from impactcell.process.cell_logger import CellLogger
 from impactcell.process.condition_log import ConditionLog
-from impactcell.records import (
-    NOT_CONNECTED_YET,
-    BatchAnnouncement,
-    Evidence,
-    ModuleStatus,
-    PositioningState,
-    Snapshot,
-)
+from impactcell.records import BatchAnnouncement, Evidence, ModuleStatus, PositioningState, Snapshot
 from impactcell.records.uncertainty import plus_minus
 from impactcell.scada import Server
 from impactcell.service.factory import cell_design, module_link
@@ -275,6 +268,7 @@ class CellTask:
         while True:
             await asyncio.sleep(TICK_S)
             await self.worker.expire_shelving(time.time_ns())
+            self._publisher.publish_start(self.status)
             if (status := self._module.status).reason:
                 await self._fault_alarms.tell_link(status)
             silent_s = time.monotonic() - self._last_cycle_s
@@ -293,5 +287,4 @@ class CellTask:
         if self.worker.snapshot is not None:
             self._publisher.publish(self.worker.snapshot)
             self._publisher.mark_stale(self.worker.snapshot.time_ns)
-        if self.status.reason == NOT_CONNECTED_YET:
-            self._publisher.publish_start()
+        self._publisher.publish_start(self.status)

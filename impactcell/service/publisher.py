@@ -7,8 +7,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from impactcell.alarms import RULES
+from impactcell.numerics.compilation import has_lacked_code
 from impactcell.process.cell_logger import CellLogger
-from impactcell.records import Alarm, Capture, ModuleStatus, PositioningState, Snapshot
+from impactcell.records import NOT_CONNECTED_YET, Alarm, Capture, ModuleStatus, PositioningState, Snapshot
 from impactcell.web.interface import CellNews, Freshness
 
 if TYPE_CHECKING:
@@ -95,9 +96,13 @@ class CellPublisher:
             self._log.log(level, message, alarm.name, alarm.message, cycle=alarm.cycle or None)
         (self._active.add if alarm.active else self._active.discard)(alarm.name)
 
-    def publish_start(self) -> None:
-        """Show that nothing has been tried yet: no value is of now, and no link is lost."""
-        self._put(freshness=Freshness.STARTING)
+    def publish_start(self, status: ModuleStatus) -> None:
+        """Show where nothing has been tried yet: no value is of now, and no link is lost.
+
+        That the start is one that compiles is known only some time after it has begun: call it now and then.
+        """
+        if status.reason == NOT_CONNECTED_YET:
+            self._put(freshness=Freshness.COMPILING if has_lacked_code() else Freshness.STARTING)
 
     def mark_stale(self, time_ns: int) -> None:
         """Show that the values are of another time."""

@@ -13,9 +13,13 @@ from impactcell.scada import Actor, ConditionAction
 
 
 class Freshness(enum.Enum):
-    """Whether the values of a cell are of now."""
+    """Whether the values of a cell are of now; before its module was asked for the first time none are.
+
+    That takes seconds (starting), on a new machine minutes (compiling).
+    """
 
     STARTING = "starting"
+    COMPILING = "compiling"
     LIVE = "live"
     STALE = "stale"
     LOST = "lost"

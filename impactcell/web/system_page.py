@@ -14,7 +14,7 @@ from impactcell.records import Alarm, ModuleStatus
 from impactcell.scada import RefusedError, Role
 from impactcell.scada.users import User, read_users
 from impactcell.web.cell_view import CellView
-from impactcell.web.interface import CellFacts
+from impactcell.web.interface import CellFacts, Freshness
 from impactcell.web.page_context import PageContext
 from impactcell.web.requests import RequestRefusedError
 from impactcell.web.sessions import BrowserSession
@@ -26,8 +26,14 @@ class CellSystem:
 
     facts: CellFacts
     status: ModuleStatus
+    freshness: Freshness
     journal_bytes: int
     journal_fault: Alarm | None
+
+    @property
+    def is_starting(self) -> bool:
+        """Whether its module was not asked yet: no link is lost."""
+        return self.freshness in (Freshness.STARTING, Freshness.COMPILING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +108,8 @@ def _users(path: Path) -> list[User]:
 
 def _cell_system(facts: CellFacts, view: CellView, size: int) -> CellSystem:
     fault = view.conditions.get(journal_fault.NAME)
-    return CellSystem(facts, view.status, size, fault if fault is not None and fault.active else None)
+    shown_fault = fault if fault is not None and fault.active else None
+    return CellSystem(facts, view.status, view.freshness, size, shown_fault)
 
 
 def _size(journal: Path | None) -> int:

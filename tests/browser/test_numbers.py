@@ -167,15 +167,20 @@ def test_the_number_of_a_cycle_is_written_as_in_the_text_of_an_alarm(browser: Br
 
 
 @pytest.mark.parametrize(
-    ("language", "said"),
-    [("en", "○ starting: compiling for this machine"), ("de", "○ startet: übersetzt für diese Maschine")],
+    ("language", "freshness", "said"),
+    [
+        ("en", Freshness.STARTING, "○ starting"),
+        ("de", Freshness.STARTING, "○ startet"),
+        ("en", Freshness.COMPILING, "○ starting: compiling, takes minutes"),
+        ("de", Freshness.COMPILING, "○ startet: übersetzt, dauert Minuten"),
+    ],
 )
 def test_a_module_that_was_not_asked_yet_is_not_told_in_red(
-    browser: Browser, language: str, said: str
+    browser: Browser, language: str, freshness: Freshness, said: str
 ) -> None:
     load(browser, language)
     view = CellView("press-1")
-    view.take(CellNews("press-1", freshness=Freshness.STARTING))
+    view.take(CellNews("press-1", freshness=freshness))
     script = """
         const root = document.createElement("div");
         root.innerHTML = '<b data-field="state"></b>';

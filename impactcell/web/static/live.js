@@ -66,9 +66,9 @@ export function showValues(root, card) {
 
 export function showState(root, card) {
   const kind = card.freshness === "live" && !hasCycle(card) ? "waiting" : card.freshness;
-  const sign = { live: "●", starting: "○", waiting: "○", stale: "!", lost: "✕" }[kind];
+  const sign = { live: "●", starting: "○", compiling: "○", waiting: "○", stale: "!", lost: "✕" }[kind];
   for (const place of root.querySelectorAll('[data-field="state"]')) {
-    place.className = `state ${{ live: "good", starting: "plain", waiting: "plain", stale: "warn", lost: "bad" }[kind]}`;
+    place.className = `state ${{ live: "good", starting: "plain", compiling: "plain", waiting: "plain", stale: "warn", lost: "bad" }[kind]}`;
     place.textContent = `${sign} ${texts[kind]}`;
     place.title = card.link_reason[language];
   }

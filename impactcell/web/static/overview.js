@@ -46,7 +46,7 @@ follow("/live", {
     const root = cardOf(card.cell);
     if (!root) return;
     showState(root, card);
-    worry(card.cell, { state: ["live", "starting"].includes(card.freshness) ? "" : card.freshness });
+    worry(card.cell, { state: ["live", "starting", "compiling"].includes(card.freshness) ? "" : card.freshness });
     if (!hasCycle(card)) return;
     const cycle = card.values["Friction/CycleNumber"], curve = curves.get(card.cell) ?? [];
     if (curve.at(-1)?.[0] !== cycle) curve.push([cycle, card.values["Friction/StaticFriction"]]);

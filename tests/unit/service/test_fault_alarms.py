@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import threading
 import time
 from collections.abc import AsyncIterator, Awaitable
 from dataclasses import replace
@@ -15,6 +16,8 @@ from impactcell.alarms.rules import journal_fault, module_connection, positionin
 from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.store import Journal
+from impactcell.numerics import compilation
+from impactcell.numerics.compilation import announce_compilation
 from impactcell.positioning.task_state_machine import TaskPhase, TaskState
 from impactcell.records import Alarm, Evidence
 from impactcell.service.cell_task import CellTask
@@ -172,21 +175,43 @@ async def test_a_start_of_the_service_is_no_fault_of_the_link(
 
 
 @pytest.mark.parametrize("task", [False], indirect=True)
-async def test_a_module_that_was_not_asked_yet_is_not_told_to_be_lost(task: CellTask) -> None:
+async def test_a_module_that_was_not_asked_yet_is_not_told_to_be_lost(
+    task: CellTask, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The page said so in red for the minutes that a new machine compiles for."""
     feed = LiveFeed([task.cell.name])
     task._publisher.feed = feed
+    monkeypatch.setattr(compilation, "_lacked", threading.Event())
     task._publish_restored()
     card = feed.views[task.cell.name].card()
     assert card["freshness"] == "starting"
     assert card["link_reason"]["en"] == task.health.reason
-    assert "compiling for this machine" in task.health.reason
-    assert "übersetzt für diese Maschine" in card["link_reason"]["de"]
+    assert task.health.reason == "not connected yet (starting)"
+    assert card["link_reason"]["de"] == "noch nicht verbunden (startet)"
     task._module._account.disconnect(SILENT)
     assert feed.views[task.cell.name].card()["freshness"] == "lost"
     assert task.health.reason == SILENT
+    task._publisher.publish_start(task.status)
+    assert feed.views[task.cell.name].card()["freshness"] == "lost"
     task._publish_restored()  # begun anew after a fault
     assert feed.views[task.cell.name].card()["freshness"] == "lost"
+
+
+@pytest.mark.parametrize("task", [False], indirect=True)
+async def test_a_start_says_that_it_compiles_only_where_it_does(
+    task: CellTask, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each start said so, also where the machine code was on the disk."""
+    feed = LiveFeed([task.cell.name])
+    task._publisher.feed = feed
+    monkeypatch.setattr(compilation, "_lacked", threading.Event())
+    task._publish_restored()
+    assert feed.views[task.cell.name].card()["freshness"] == "starting"
+    monkeypatch.setattr("impactcell.service.cell_task.TICK_S", 0.0)
+    announce_compilation()
+    async with beside(task._tick()), asyncio.timeout(PATIENCE_S):
+        while feed.views[task.cell.name].card()["freshness"] != "compiling":
+            await asyncio.sleep(0)
 
 
 class Shown:
