@@ -129,6 +129,29 @@ def test_enter_does_what_the_field_is_for(
     assert done == [(EventKind.SHELVE_TIMED, "", 2700.0), (EventKind.COMMENT, "seen", 0.0)]
 
 
+PRESS_TWICE = """
+    const held = [], button = document.querySelector("button[value=acknowledge]");
+    addEventListener("submit", (event) => held.push(event.defaultPrevented));
+    button.click();
+    button.click();
+    return held;
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("server", [1], indirect=True)
+def test_a_button_that_is_pressed_twice_sends_its_form_once(
+    server: PageServer, backend: Backend, browser: Browser
+) -> None:
+    """The second answer said that somebody had acknowledged it already."""
+    browser.open(f"{server.endpoint}/alarms")
+    for count in (1, 2):  # again on the page that came of it
+        browser.find("button[value=acknowledge]")
+        assert browser.run(PRESS_TWICE) == [False, True]
+        browser.until(lambda count=count: len(backend.acted) == count, "what was done")
+        browser.until(lambda: browser.run("return !document.querySelector('[data-sent]')"), "the page anew")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("path", ["/", f"/cells/{CELLS[0]}"])
 def test_what_is_shelved_hides_nothing_that_is_open(server: PageServer, browser: Browser, path: str) -> None:

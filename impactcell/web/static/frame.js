@@ -10,6 +10,14 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => docu
 const told = new URL(location.href);
 for (const name of ["done", "refused"]) told.searchParams.delete(name);
 if (told.search !== location.search) history.replaceState(history.state, "", told);
+// A form is sent once: pressed twice it would be refused the second time, and the page would tell of a fault. A page
+// that is come back to may send it again.
+document.addEventListener("submit", (event) => {
+  if (event.defaultPrevented || event.target.method !== "post") return;
+  if (event.target.dataset.sent) event.preventDefault();
+  event.target.dataset.sent = "yes";
+});
+addEventListener("pageshow", () => { for (const form of document.forms) delete form.dataset.sent; });
 // Choosing a language keeps the rest of the address.
 for (const link of document.querySelectorAll(".languages a")) {
   const address = new URL(location.href);

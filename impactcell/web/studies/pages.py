@@ -138,14 +138,20 @@ async def study_state(context: PageContext, request: Request, session: BrowserSe
 
 def _rendered(context: PageContext, request: Request, session: BrowserSession, template: str) -> Response:
     shown = _study(context, request)
-    may_accept = session.actor.role >= Role.ENGINEER and (shown.can_be_accepted or shown.can_be_restored)
+    changed_since = context.studies.store.changed_since(shown)
+    is_in_service = shown.is_accepted and changed_since is None
+    may_accept = session.actor.role >= Role.ENGINEER
     return context.page(
         request,
         template,
         session,
         study=shown,
         place=context.studies.place(shown),
-        may_accept=may_accept,
+        may_accept=may_accept and shown.can_be_accepted and not is_in_service,
+        may_restore=may_accept and shown.can_be_restored and is_in_service,
+        may_remove=_may_remove(shown, session),
+        is_in_service=is_in_service,
+        changed_since=changed_since,
         differing=differing_parameters(shown.result, shown.changes),
         report=REPORTS.get(_report_language(context, request, shown), ""),
     )
@@ -203,6 +209,11 @@ async def _change_model(
 ) -> Response:
     study = _study(context, request)
     extended = context.studies.store.results(study) / "model.extended.yaml"
+    is_latest = context.studies.store.changed_since(study) is None
+    if study.accepting or (is_latest and study.acceptances and study.acceptances[-1].action == action):
+        return _to(study)  # somebody was faster, or pressed twice: its page says what was done
+    if action == "restore" and study.is_accepted and not is_latest:
+        return _to(study)  # the model from before is another one by now: its page says so
     if not (study.can_be_restored if action == "restore" else study.can_be_accepted):
         raise RequestRefusedError(409, "error_study_stage")
     study.accepting, study.refusals = action, []
@@ -234,13 +245,19 @@ async def remove(
 ) -> Response:
     """Forget a study; who began it may, and engineers."""
     study = _study(context, request)
-    if study.user != session.actor.user and session.actor.role < Role.ENGINEER:
+    if not _may_remove(study, session):
         raise RequestRefusedError(403, "error_role")
     if study.accepting:
         raise RequestRefusedError(409, "error_study_stage")
     context.studies.forget(study)
     await asyncio.to_thread(context.studies.store.remove, study)
     return RedirectResponse("/studies", 303)
+
+
+def _may_remove(study: Study, session: BrowserSession) -> bool:
+    """Whether somebody began a study and may still begin one, or is an engineer."""
+    role = session.actor.role
+    return role >= Role.ENGINEER or (role >= Role.OPERATOR and study.user == session.actor.user)
 
 
 def _enqueue_allowed(context: PageContext) -> None:

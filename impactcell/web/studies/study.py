@@ -154,6 +154,20 @@ class StudyStore:
         """Give all, the newest first."""
         return iter(sorted(self._studies.values(), key=lambda study: -study.created_ms))
 
+    def changed_since(self, study: Study) -> Study | None:
+        """Find the study by which the model of its cell was changed last, if that was after its own last."""
+        mine = max((done.time_ms for done in study.acceptances), default=None)
+        if mine is None:
+            return None
+        later = (
+            (done.time_ms, other.id, other)
+            for other in self._studies.values()
+            if other.cell == study.cell and other is not study
+            for done in other.acceptances
+            if done.time_ms > mine
+        )
+        return max(later, default=(0, "", None))[2]
+
     def find(self, study_id: str) -> Study | None:
         """Find one; None where there is none."""
         return self._studies.get(study_id)

@@ -64,8 +64,8 @@ STUDY_TEXTS: Texts = {
     ),
     "accept_title": ("What changes in", "Was sich ändert in"),
     "parameter": ("Parameter", "Parameter"),
-    "before": ("Now", "Jetzt"),
-    "after": ("Then", "Dann"),
+    "before": ("Before", "Vorher"),
+    "after": ("After", "Nachher"),
     "then_differs": (
         ("“Outcome” has another value, which is to be believed: it was fitted beside a form of what remains. "
          "This model has none, so its value takes up a part of that, and its interval does not hold beside "
@@ -94,17 +94,26 @@ STUDY_TEXTS: Texts = {
     "accept_engineers": ("Engineers can put it into service.", "Ingenieure können es in Betrieb nehmen."),
     "did_accept": ("Put into service", "In Betrieb genommen"),
     "did_restore": ("Put back", "Zurückgenommen"),
+    "changed_since": (
+        "Since then the model of this cell was changed by another measurement:",
+        "Seitdem hat eine andere Messung das Modell dieser Zelle geändert:",
+    ),
     "look_at": ("Look at:", "Nachsehen:"),
     "per_kilogram": (
         "for a part of 1 kg: no slide states its mass, and no cell can run with this",
         "für ein Teil von 1 kg: kein Gleiten nennt seine Masse, und keine Zelle kann damit laufen",
     ),
-    "tied_with": ("These shots cannot tell it from", "Diese Stöße unterscheiden es nicht von"),
+    "tied_with": ("These measurements cannot tell it from:", "Diese Messungen unterscheiden es nicht von:"),
     "report": ("Report", "Bericht"),
     "report_alone": ("Open report", "Bericht öffnen"),
     "report_language": ("All of it, with figures; to send on it is one file.",
                         "Alles, mit Bildern; zum Weitergeben eine einzige Datei."),
     "remove": ("Remove this measurement", "Diese Messung entfernen"),
+    "remove_help": (
+        "Its files and results are deleted for good. The cell's model stays as it is.",
+        "Ihre Dateien und Ergebnisse werden endgültig gelöscht. Das Modell der Zelle bleibt, wie es ist.",
+    ),
+    "remove_now": ("Delete", "Löschen"),
     "error_kind": ("Files of this kind cannot be read.", "Dateien dieser Art sind nicht lesbar."),
     "error_file_too_large": ("The file is too large: 500 MB at most, all files together.",
                              "Die Datei ist zu groß: höchstens 500 MB, alle Dateien zusammen."),

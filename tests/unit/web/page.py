@@ -38,6 +38,7 @@ class Backend:
     changed: list[tuple[str, str, str]] = field(default_factory=list)
     replaced: list[tuple[str, str, str]] = field(default_factory=list)
     refuses: str = ""
+    held: asyncio.Event | None = None
 
     async def log_in(self, name: str, password: str, address: str) -> Actor:
         self.logins.append((name, address))
@@ -54,6 +55,8 @@ class Backend:
     async def accept_model(self, cell: str, extended: Path, actor: Actor) -> str:
         if self.refuses:
             raise RefusedError("BadInvalidState", self.refuses)
+        if self.held is not None:
+            await self.held.wait()
         self.changed.append((cell, extended.name, actor.user))
         return "extended"
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import msgspec
 import pytest
 
 from impactcell.campaign import read
@@ -165,7 +166,7 @@ async def test_a_campaign_is_dropped_confirmed_and_studied(page: Page, verbs: Ve
     assert 'data-effect="viscous_friction"' in text
     assert "Friction grows with speed." in text
     assert "the &lt;oil&gt;" in text
-    assert "These shots cannot tell it from quadratic drag" in text
+    assert 'cannot tell it from:<ul><li data-tied="quadratic_drag">Quadratic drag</li></ul>' in text
     assert '<td data-label="Parameter">µs</td>' in text
     assert "/accept" not in text, "an operator accepts nothing"
 
@@ -230,6 +231,86 @@ async def test_an_engineer_accepts_and_takes_back(page: Page) -> None:
     assert page.backend.changed == [(CELL, "model.extended.yaml", "eva"), (CELL, "", "eva")]
     assert [done.action for done in found.acceptances] == ["accept", "restore"]
     assert found.refusals == ["part would not slide"]
+
+
+async def test_what_is_pressed_twice_or_by_two_people_is_done_once_and_tells_no_fault(page: Page) -> None:
+    """The second press got a page that said that it did not work, while it was being done."""
+    async with page.logged_in(Role.ENGINEER) as client, page.logged_in(Role.ENGINEER) as other:
+        study, csrf = await investigated(page, client)
+        page.backend.held = asyncio.Event()
+        theirs = {"csrf": await csrf_of(other)}
+        for who, form in ((client, csrf), (other, theirs), (client, csrf)):
+            answer = await who.post(f"/studies/{study}/accept", data=form)
+            assert (answer.status_code, answer.headers["location"]) == (303, f"/studies/{study}")
+        page.backend.held.set()
+        await until(page, study, Stage.DONE)
+        for action in ("accept", "restore", "restore"):
+            assert (await other.post(f"/studies/{study}/{action}", data=theirs)).status_code == 303
+            found = await until(page, study, Stage.DONE)
+    assert page.backend.changed == [(CELL, "model.extended.yaml", "eva"), (CELL, "", "eva")]
+    assert [done.action for done in found.acceptances] == ["accept", "restore"]
+
+
+async def test_undoing_is_not_offered_where_another_model_came_since(page: Page) -> None:
+    """It would have put back the model that the other measurement's had replaced: its own."""
+    async with page.logged_in(Role.ENGINEER) as client:
+        (first, csrf), (second, _) = [await investigated(page, client) for _ in range(2)]
+        for now_ms, study in enumerate((first, second), 1):
+            await client.post(f"/studies/{study}/accept", data=csrf)
+            found = await until(page, study, Stage.DONE)
+            found.acceptances = [msgspec.structs.replace(found.acceptances[0], time_ms=now_ms)]
+        shown = {code: (await client.get(f"/studies/{first}?lang={code}")).text for code in ("en", "de")}
+        last = (await client.get(f"/studies/{second}")).text
+        changed = list(page.backend.changed)
+        assert (await client.post(f"/studies/{first}/restore", data=csrf)).status_code == 303
+        assert page.backend.changed == changed
+    assert "/restore" not in shown["en"]
+    assert f'action="/studies/{first}/accept"' in shown["en"]
+    assert f'changed by another measurement: <a href="/studies/{second}">' in shown["en"]
+    assert "hat eine andere Messung das Modell dieser Zelle geändert" in shown["de"]
+    assert f'action="/studies/{second}/restore"' in last
+    assert "another measurement" not in last
+
+
+async def test_who_may_not_accept_or_remove_is_not_offered_it(page: Page) -> None:
+    """An operator was offered to remove the measurements of others, and told that engineers could accept
+    what was in service already."""
+    operator = page.logged_in(Role.OPERATOR)
+    async with page.logged_in(Role.ENGINEER) as client, operator as other:
+        study, csrf = await investigated(page, client)
+        before = (await other.get(f"/studies/{study}")).text
+        await client.post(f"/studies/{study}/accept", data=csrf)
+        await until(page, study, Stage.DONE)
+        after = (await other.get(f"/studies/{study}")).text
+        assert f'action="/studies/{study}/remove"' in (await client.get(f"/studies/{study}")).text
+    assert "/remove" not in before
+    assert "Engineers can put it into service." in before
+    assert "Engineers can put it into service." not in after
+    assert "Put into service" in after
+
+
+async def test_strengths_of_what_cannot_be_told_apart_are_said_with_their_units(
+    page: Page, verbs: Verbs
+) -> None:
+    """Of a rotation the German page said "viscous coefficient n m s per rad", and of rivals no strength."""
+    effect = {
+        "effect": "viscous_friction",
+        "tied_with": ["coulomb_friction", "load_dependent_friction"],
+        "parameters": {"viscous_coefficient_n_m_s_per_rad": {"value": 0.0198, "ci95": [0.0171, 0.0225]}},
+        "tied_parameters": {
+            "coulomb_friction": {"friction_n_m": {"value": 0.0723, "ci95": [0.0627, 0.0819]}},
+            "load_dependent_friction": {"load_coefficient": {"value": 0.00576, "ci95": [0.005, 0.0065]}},
+        },
+    }
+    verbs.outcomes["discrepancy"] = VerbOutcome(0, json.dumps(RESULT | {"effects": [effect]}), ())
+    async with page.logged_in(Role.ENGINEER) as client:
+        study, _ = await investigated(page, client)
+        shown = {code: (await client.get(f"/studies/{study}?lang={code}")).text for code in ("en", "de")}
+    assert "viscous coefficient 0.0198 N m s/rad (95 %: 0.0171 to 0.0225)" in shown["en"]
+    assert "viskoser Koeffizient 0,0198 N m s/rad (95 %: 0,0171 bis 0,0225)" in shown["de"]
+    assert "Coulomb friction · friction 0.0723 N m (95 %: 0.0627 to 0.0819)</li>" in shown["en"]
+    assert "unterscheiden es nicht von:<ul>" in shown["de"]
+    assert "Lastabhängige Reibung · Lastbeiwert 0,00576 (95 %: 0,005 bis 0,0065)</li>" in shown["de"]
 
 
 async def test_a_model_that_is_refused_leaves_the_study_as_it_was(page: Page, verbs: Verbs) -> None:
@@ -817,8 +898,8 @@ async def test_parameters_are_said_in_words_with_their_unit(page: Page) -> None:
     assert "old → <b>rail + Stribeck friction + own_effect</b>" in shown["en"]
     assert "old → <b>rail + Stribeck-Reibung + own_effect</b>" in shown["de"]
     assert "rail + Stribeck-Reibung, eva" in shown["de"]
-    assert '<td data-label="Dann">1,5 (95 %: 1,25 bis 1,75)</td>' in shown["de"]
-    assert '<td data-label="Then">1.5</td>' in shown["en"]
+    assert '<td data-label="Nachher">1,5 (95 %: 1,25 bis 1,75)</td>' in shown["de"]
+    assert '<td data-label="After">1.5</td>' in shown["en"]
     assert names == ["µs", "Steifigkeit [N/m]", "Viskose Reibung: viskoser Koeffizient [N s/m]"]
 
 
