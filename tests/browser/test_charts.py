@@ -134,6 +134,15 @@ def test_one_value_alone_has_labels_that_fit(charts: Browser, value: float) -> N
     assert max(map(len, labels)) <= 7
 
 
+def test_an_axis_ends_where_the_last_curve_does(charts: Browser) -> None:
+    """Three quarters of the friction along a short slide were an empty grid."""
+    short, shorter, none = [1, 2, 3, None, None, None], [1, 2, None, None, None, None], [None] * 6
+    labels, _ = charts.driver.execute_async_script(LABELS, 600, [list(range(6)), shorter, short], {})
+    assert float(labels[-1]) == 2.0
+    labels, _ = charts.driver.execute_async_script(LABELS, 600, [list(range(6)), none, none], {})
+    assert float(labels[-1]) == 5.0
+
+
 WORD = """
     const [curve, marks, done] = arguments;
     chart.show([curve.map((_, x) => x), curve, curve, curve], marks);

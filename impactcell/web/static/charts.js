@@ -51,6 +51,12 @@ const TIME_STEPS = [1, 2, 5, 10, 15, 20, 30, ...[1, 2, 3, 5, 10, 15, 20, 30].map
 
 const LEAST_SPAN = 0.05; // of an axis, as a share of its value
 
+/** Columns up to the last x at which one of them has a value: no axis goes on beyond what there is. */
+function untilTheLast(columns) {
+  const [x, ...curves] = columns, last = x.findLastIndex((_, i) => curves.some((curve) => (curve[i] ?? null) !== null));
+  return last < 0 ? columns : columns.map((column) => column.slice(0, last + 1));
+}
+
 /** A chart in an element. `show` takes columns [x, band low, band high, line, ...]; series are described once. */
 export class Chart {
   constructor(element, { unit, xUnit, time = false, band = [1, 2], series, include = [] }) {
@@ -62,8 +68,8 @@ export class Chart {
 
   show(data, marks = []) {
     this.marks = marks;
-    this.data = data;
-    if (this.plot) this.plot.setData(data);
+    this.data = this.time ? data : untilTheLast(data);
+    if (this.plot) this.plot.setData(this.data);
     else this.rebuild();
   }
 
