@@ -23,6 +23,7 @@ from impactcell.demo.scenario_setup import USER, DemoSetup, set_up_scenario
 from impactcell.demo.targets import number, targets_json, targets_table
 from impactcell.demo.view import Scene, render
 from impactcell.errors import ImpactCellError
+from impactcell.numerics.compilation import has_lacked_code
 from impactcell.positioning.task_state_machine import TaskOutcome
 from impactcell.process.console import is_quiet, print_note
 from impactcell.process.signals import ends_of_terminal, stop_on_signals
@@ -186,6 +187,7 @@ class _DemoRun:
             list(self.snapshots),
             link,
             time.monotonic() - self.began_s,
+            compiles=has_lacked_code(),
         )
 
     def table(self) -> RenderableType | None:

@@ -11,7 +11,7 @@ from impactcell.positioning.task_state_machine import TaskOutcome
 
 
 def targets_table(outcomes: Sequence[TaskOutcome], tolerance_m: float) -> Table:
-    """One row a part, in their order, and a row that sums up, but for ways that are not known."""
+    """One row a part, in their order, and below what they come to, but for ways that are not known."""
     table = Table(title="parts tapped to their targets", title_justify="left", header_style="dim", box=None)
     for heading in ("part", "mass", "from", "target", "taps", "off target", ""):
         table.add_column(heading, justify="left" if not heading else "right", no_wrap=bool(heading))
@@ -23,18 +23,18 @@ def targets_table(outcomes: Sequence[TaskOutcome], tolerance_m: float) -> Table:
             f"{outcome.start_m * 1e3:.3f} mm",
             f"{outcome.target_m * 1e3:.3f} mm",
             str(outcome.taps),
-            f"{off_um:+.0f} µm" if math.isfinite(off_um) else "–",
+            f"{round(off_um) + 0:+d} µm" if math.isfinite(off_um) else "–",
             Text("inside", style="green") if outcome.settled else Text(outcome.reason, style="bold red"),
         )
     hits = sum(outcome.settled for outcome in outcomes)
     taps = sum(outcome.taps for outcome in outcomes)
     ways_m = (abs(outcome.position_m - outcome.start_m) for outcome in outcomes)
     travelled = math.fsum(way_m for way_m in ways_m if math.isfinite(way_m))
-    table.add_section()
-    table.add_row(
-        "all", "", "", f"{travelled * 1e3:.1f} mm", str(taps), f"± {tolerance_m * 1e6:.0f} µm",
-        f"{hits} of {len(outcomes)} inside, {taps / max(len(outcomes), 1):.1f} taps a part",
-    )  # fmt: skip
+    table.caption_justify = "left"
+    table.caption = (
+        f"{hits} of {len(outcomes)} inside ± {tolerance_m * 1e6:.0f} µm, {taps} taps, "
+        f"{taps / max(len(outcomes), 1):.1f} a part, {travelled * 1e3:.1f} mm travelled"
+    )
     return table
 
 

@@ -42,6 +42,8 @@ class Scene:
         State of the link to the module; empty once the cell has ended, so that nobody tries to connect.
     waited_s : float
         Since the beginning.
+    compiles : bool
+        Whether machine code is missing on this machine, so that the first cycle waits for it.
     """
 
     cell: str
@@ -50,15 +52,16 @@ class Scene:
     snapshots: Sequence[Snapshot]
     link: str = "connected"
     waited_s: float = 0.0
+    compiles: bool = False
 
 
 def render(scene: Scene, width: int = 100, height: int = 40) -> RenderableType:
     """Draw the scene for a terminal of `width` columns and `height` lines; the chart gets what is left."""
     if not scene.snapshots:
-        waiting = (
-            f"waiting for the first cycle for {scene.waited_s:.0f} s ({scene.link}); "
-            "on a new machine much is compiled before, which takes a minute or two"
+        why = (
+            "compiling for this machine, once, which takes a minute or two" if scene.compiles else scene.link
         )
+        waiting = f"waiting for the first cycle for {scene.waited_s:.0f} s: {why}"
         return Panel(waiting, title=f"impactcell · {scene.cell}", width=width)
     last, wide = scene.snapshots[-1], width >= WIDE
     measure = Console(width=width - 4, file=io.StringIO())

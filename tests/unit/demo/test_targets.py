@@ -28,8 +28,12 @@ def test_the_table_says_target_taps_and_distance_of_every_part() -> None:
     assert all(word in first for word in ("12.0 kg", "0.000 mm", " 3 ", "+21 µm", "inside"))
     second = next(line for line in lines if "25.000 mm" in line)
     assert all(word in second for word in ("-800 µm", " 5 ", "moved nothing"))
-    assert "1 of 2 inside, 4.0 taps a part" in lines[-1]
-    assert "33.2 mm" in lines[-1]
+    assert lines[-1].strip() == "1 of 2 inside ± 50 µm, 8 taps, 4.0 a part, 33.2 mm travelled"
+
+
+def test_what_is_off_by_less_than_a_micrometre_has_no_sign_of_a_fault() -> None:
+    near = TaskOutcome(0.010, 0.0, 0.0099997, 12.0, 3, settled=True, reason="in place")
+    assert "+0 µm" in printed((near,))
 
 
 def test_where_a_part_lies_that_nobody_knows_is_no_number() -> None:

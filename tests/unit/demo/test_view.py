@@ -207,7 +207,8 @@ def test_a_limit_that_was_passed_is_said_to_be() -> None:
 
 def test_before_the_first_cycle_it_says_how_long_and_what_is_waited_for() -> None:
     console = Console(width=100, file=io.StringIO(), record=True)
-    console.print(render(Scene("press-1", "", "", [], "not connected", waited_s=34.2)))
-    text = " ".join(console.export_text().split())
-    assert "waiting for the first cycle for 34 s (not connected)" in text
-    assert "compiled" in text
+    for compiles in (False, True):
+        console.print(render(Scene("press-1", "", "", [], "not connected", 34.2, compiles=compiles)))
+    text = console.export_text()
+    assert text.count("waiting for the first cycle for 34 s: not connected ") == 1
+    assert text.count("waiting for the first cycle for 34 s: compiling for this machine, once") == 1
