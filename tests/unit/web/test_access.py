@@ -18,7 +18,7 @@ from impactcell.scada.users import User, read_users, write_users
 from impactcell.web import system_page
 from impactcell.web.app import ACTIONS, VIEWS, Action, View
 from impactcell.web.cell_view import alarm_content
-from impactcell.web.interface import CellNews
+from impactcell.web.interface import CellNews, Freshness
 from impactcell.web.requests import MAX_FORM_BYTES
 from impactcell.web.security_headers import HEADERS
 from impactcell.web.sessions import IDLE_S, LONGEST_S
@@ -102,6 +102,9 @@ async def test_each_role_sees_what_it_may(page: Page, view: View, role: Role) ->
 @pytest.mark.parametrize("role", Role, ids=lambda role: role.name)
 @pytest.mark.parametrize("action", ACTIONS, ids=lambda action: action.path)
 async def test_each_role_does_what_it_may(page: Page, action: Action, role: Role) -> None:
+    if action.path.endswith("/accept"):  # what is in service is not put there again
+        for study in page.studies.store:
+            study.acceptances = []
     async with page.logged_in(role) as client:
         form = {"thumbprint": "AB", "goal": "estimate", **acknowledgement(raised())}
         if action.path.endswith("/read"):  # takes no fields but its own
@@ -303,6 +306,18 @@ async def test_logging_out_ends_the_session(page: Page) -> None:
         await client.post("/logout", data={"csrf": await csrf_of(client)})
         client.cookies["impactcell_8480"] = token
         assert (await client.get("/")).status_code == 303
+
+
+@pytest.mark.parametrize("freshness", [Freshness.STARTING, Freshness.COMPILING])
+async def test_a_cell_that_starts_has_lost_no_link(page: Page, freshness: Freshness) -> None:
+    """The system page told of it in red, while the cell's own said that it starts."""
+    async with page.logged_in(Role.OBSERVER) as client:
+        page.feed.put(CellNews(CELL, freshness=freshness))
+        starting = (await client.get("/system?lang=en")).text
+        page.feed.put(CellNews(CELL, freshness=Freshness.LOST))
+        lost = (await client.get("/system?lang=en")).text
+    assert ("○ starting" in starting, "✕ no connection" in starting) == (True, False)
+    assert ("○ starting" in lost, "✕ no connection" in lost) == (False, True)
 
 
 async def test_users_and_certificates_are_shown_to_engineers_only(page: Page) -> None:
