@@ -21,20 +21,20 @@ def law_of(
 ) -> Callable[[Samples, Samples, Samples], list[Samples]]:
     """Sum of all smooth forces, and level of friction, of position, velocity and load: shape (n,) each."""
     parts = [
-        (
-            term_of(chosen.choice),
-            chosen,
-            np.array([model.value(column) for column in chosen.columns]),
-            covariates[chosen.choice.covariate],
-        )
+        (term_of(chosen.choice), chosen, np.array([model.value(column) for column in chosen.columns]))
         for chosen in model.terms
     ]
 
     def law(position: Samples, velocity: Samples, load: Samples) -> list[Samples]:
         sums = [np.zeros(position.shape), np.zeros(position.shape)]
-        for term, chosen, strengths, covariate in parts:
-            features = term.features(MotionState(position, velocity, load, covariate), chosen.shape)
-            sums[term.is_friction] += strengths @ features
+        motions_by = {
+            name: MotionState(position, velocity, load, column) for name, column in covariates.items()
+        }
+        for term, chosen, strengths in parts:
+            features = term.features(motions_by[chosen.choice.covariate], chosen.shape)
+            sums[term.is_friction] += (
+                strengths @ features if len(strengths) > 1 else strengths[0] * features[0]
+            )
         return sums
 
     return law
