@@ -47,16 +47,21 @@ def paths(
     """
     lanes = drives.shape[1]
     position, speed = np.zeros(lanes), np.zeros(lanes)
-    level = friction or (lambda _q, _v: np.full(lanes, COULOMB_N))
+    half, gain = 0.5 * step_s, step_s / MASS_KG
+    held = gain * np.full(lanes, COULOMB_N)
     out = []
     for number, drive in enumerate(drives):
         if number % every == 0:
             out.append(position)
-        middle = position + 0.5 * step_s * speed
-        free = speed + step_s / MASS_KG * (drive - VISCOUS_N_S_PER_M * speed - spring_n_per_m * middle)
-        left = np.abs(free) - step_s / MASS_KG * level(middle, speed)
-        speed = np.sign(free) * np.maximum(left, 0.0)
-        position = middle + 0.5 * step_s * speed
+        middle = position + half * speed
+        force = drive - VISCOUS_N_S_PER_M * speed
+        if spring_n_per_m:
+            force = force - spring_n_per_m * middle
+        free = speed + gain * force
+        if friction is not None:
+            held = gain * friction(middle, speed)
+        speed = np.sign(free) * np.maximum(np.abs(free) - held, 0.0)
+        position = middle + half * speed
     return np.array(out)
 
 

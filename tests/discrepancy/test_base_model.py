@@ -30,6 +30,7 @@ from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.errors import CampaignError, SettingsError
 from impactcell.records import Capture, Channel
 from impactcell.settings.base_model import base_model_text, read_base_model
+from tests.discrepancy.machine_study import establish_in
 
 pytestmark = pytest.mark.slow
 
@@ -102,7 +103,7 @@ def test_what_is_stated_of_the_sensors_is_believed(tmp_path: Path) -> None:
     told = {}
     for stated in ("0.02", "{value: 0.015, std: 0.01}", "0.0"):
         text = PENDULUM.replace("position_offset: {std: 0.05}", f"position_offset: {stated}")
-        finding = investigate_machine(pendulum(swings(4e-4, offset=0.02)), base_of(tmp_path, text))
+        finding = establish_in(pendulum(swings(4e-4, offset=0.02)), base_of(tmp_path, text))
         told[stated] = machine_document(finding)["nominal"].get("position_offset"), finding.is_at_floor
     assert told["0.02"] == (None, True)
     assert told["0.0"] == (None, False)
@@ -193,9 +194,9 @@ def test_what_the_simulation_contradicts_is_not_named(monkeypatch: pytest.Monkey
         return replace(error, rmse=rise[-1] if added else 1.0)
 
     monkeypatch.setattr("impactcell.discrepancy.machine.simulation.simulate_held_out", erring)
-    assert investigate_machine(seal(0.8), SEAL).established == (name,)
+    assert establish_in(seal(0.8), SEAL).established == (name,)
     rise.append(1.2)
-    finding = investigate_machine(seal(0.8), SEAL)
+    finding = establish_in(seal(0.8), SEAL)
     assert finding.verdict == "unknown"
     assert finding.established == ()
     assert finding.unconfirmed == (name,)

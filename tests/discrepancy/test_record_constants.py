@@ -27,6 +27,7 @@ from impactcell.discrepancy.report.simulation_notes import BY_RECORD, notes_of_s
 from impactcell.errors import SettingsError
 from impactcell.records import Samples
 from impactcell.settings.base_model import base_model_text, read_base_model
+from tests.discrepancy.machine_study import establish_in
 from tests.discrepancy.stick_slip import SLIDE, VISCOUS_N_S_PER_M, sines, slides
 
 LACKING = replace(SLIDE, inertia=NumberPrior(2.0, 0.2), terms=(TermChoice("coulomb_friction"),))
@@ -92,7 +93,7 @@ def test_none_are_told_where_nothing_remains(monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.slow
 def test_a_base_model_without_them_says_that_they_are_missing() -> None:
     whole = replace(LACKING, terms=SLIDE.terms)
-    blind = found(whole, 9, SPREAD_N)
+    blind = establish_in(records(9, SPREAD_N), whole)
     assert blind.fall.after > 20.0
     (note,) = constants_note(blind.remainder.constant_share)
     assert note in blind.notes

@@ -14,6 +14,7 @@ from impactcell.discrepancy.report.german_notes import note as german_note
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.discrepancy.report.machine_sentences import noise_keys
 from impactcell.records import Capture, Channel
+from tests.discrepancy.machine_study import establish_in
 
 pytestmark = pytest.mark.slow
 
@@ -74,7 +75,7 @@ def test_a_model_that_misses_nothing_leaves_no_gap(raster: float) -> None:
 @pytest.mark.slow
 def test_a_position_that_is_not_said_to_be_summed_up_has_a_false_gap() -> None:
     """What the mark is for: noise that adds up is a motion otherwise."""
-    assert investigate_machine(motor(summed_up=False), MOTOR).fall.after > 10.0
+    assert establish_in(motor(summed_up=False), MOTOR).fall.after > 10.0
 
 
 def test_a_stated_noise_of_the_speed_counts_and_nothing_is_said() -> None:
