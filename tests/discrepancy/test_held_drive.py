@@ -24,6 +24,7 @@ from impactcell.discrepancy.report.german_notes import note as german_note
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.features import drive_noise_std
 from impactcell.records import Capture, Channel
+from tests.discrepancy.machine_study import establish_in
 
 RATE_HZ = 150.0
 MASS_KG, FRICTION_N, VISCOUS, DRIVE_N = 6.3, 2.0, 14.0, 13.0
@@ -104,7 +105,7 @@ def test_where_a_stretch_lies_is_no_motion_that_a_model_predicts() -> None:
 def test_a_command_that_is_logged_early_is_asked_after_and_found_with_what_is_missing() -> None:
     """By a sample, as by a motor's inductance: a negative delay, to a fiftieth of a sample."""
     campaign = Campaign(Excitation.DRIVEN, cart(1))
-    unasked = investigate_machine(campaign, CART)
+    unasked = establish_in(campaign, CART)
     assert unasked.verdict == "unknown"
     [note] = [note for note in unasked.notes if "would explain" in note]
     assert re.match(r"A force recorded [5-8]\.\d ms early would explain 9\d % of what remains: delay_s", note)
@@ -120,7 +121,7 @@ def test_a_command_that_is_logged_early_is_asked_after_and_found_with_what_is_mi
 @pytest.mark.slow
 def test_a_delay_goes_no_further_than_its_prior_allows() -> None:
     campaign = Campaign(Excitation.DRIVEN, cart(1))
-    finding = investigate_machine(campaign, replace(CART, delay_s=NumberPrior(0.0, 0.001)))
+    finding = establish_in(campaign, replace(CART, delay_s=NumberPrior(0.0, 0.001)))
     assert finding.nominal.delay_s == pytest.approx(-0.002)
     assert machine_document(finding)["nominal"]["delay_s"]["at_bound"]
 
