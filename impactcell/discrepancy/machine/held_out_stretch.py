@@ -22,7 +22,7 @@ PULLING_BACK = frozenset(("restoring_force", "hardening_spring"))
 OFFSET_NUDGE = 1e-3
 """Constant force that tells how far a motion drifts by one, over the largest of the drive."""
 OFFSET_STEPS, RECORD_STEPS = 2, 5
-"""Runs by which it is found, before the first state is fitted and after; but for friction drift is linear.
+"""Runs by which it is found after each fit of the first state; but for friction drift is linear.
 The second where each record has one of its own, of the size of friction."""
 
 
