@@ -4,7 +4,7 @@ An axis on paths in closed form, slides by Moreau's steps, and oscillations that
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,12 +19,16 @@ from impactcell.discrepancy.machine import (
     TermChoice,
     investigate_machine,
 )
-from impactcell.discrepancy.machine.look_alikes import like_the_machine, machine_parts
+from impactcell.discrepancy.machine.look_alikes import (
+    like_the_machine,
+    machine_parts,
+    parts_that_may_be_off,
+)
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import uniform_records
 from impactcell.discrepancy.report import german_machine_sentences, german_sentences, machine_sentences
-from impactcell.records import Capture, Channel
+from impactcell.records import Capture, Channel, Samples
 from tests.discrepancy.stick_slip import SLIDE, VISCOUS_N_S_PER_M, sines, slides
 from tests.discrepancy.test_base_model import GRAVITY, pendulum, swings
 from tests.discrepancy.test_moves_between_places import AXIS, axis, strength
@@ -195,3 +199,54 @@ def test_a_term_is_held_against_what_a_machine_has(
     base: BaseModel, names: list[str], *, is_driven: bool
 ) -> None:
     assert [*machine_parts(base, is_driven=is_driven)] == names
+
+
+CUBIC = 3000.0
+"""Stiffness of a spring without a linear part [N/m³]."""
+
+
+def duffing(records: int) -> Campaign:
+    """Records of 1 kg on a cubic spring under four sines each, by an eighth-order scheme."""
+    time, shots = np.arange(0.0, 12.0, 5e-3), []
+    for number in range(1, records + 1):
+        rng = np.random.default_rng([29, number])
+        rates, phases = rng.uniform(3.0, 12.0, 4), rng.uniform(0.0, 2.0 * math.pi, 4)
+
+        def drive(now: Samples, rates: Samples = rates, phases: Samples = phases) -> Samples:
+            force: Samples = 0.35 * np.sin(np.multiply.outer(now, rates) + phases).sum(axis=-1)
+            return force
+
+        def moves(now: float, state: Samples, drive: Callable[..., Samples] = drive) -> list[float]:
+            return [state[1], float(drive(now)) - 0.1 * state[1] - CUBIC * state[0] ** 3]
+
+        path = solve_ivp(moves, (0.0, 12.0), (0.0, 0.0), "DOP853", time, rtol=1e-9, atol=1e-11).y[0]
+        read = path + rng.normal(0.0, 3e-5, time.size)
+        force = Channel(time, drive(time) + rng.normal(0.0, 2e-3, time.size))
+        shots.append(Capture(number, math.nan, math.nan, force, Channel(time, read)))
+    return Campaign(Excitation.DRIVEN, tuple(shots))
+
+
+def test_a_spring_that_only_bends_as_a_cube_is_no_error_of_the_mass() -> None:
+    """Lightly damped, it is what moves the part: a mass that explained it would have to be near nought."""
+    base = BaseModel(
+        inertia=NumberPrior(1.0), terms=(TermChoice("restoring_force"), TermChoice("viscous_friction"))
+    )
+    finding = investigate_machine(duffing(4), base)
+    assert finding.established == ("hardening_spring",)
+    assert finding.tied_with["hardening_spring"] == ()
+    assert finding.is_at_floor
+    place = finding.final.fit.columns.index(("hardening_spring", 0.0, 0))
+    assert finding.final.fit.low[place] <= CUBIC <= finding.final.fit.high[place]
+
+
+@pytest.mark.parametrize(
+    ("off", "names"), [(0.1, ["inertia", "drive", "a constant force"]), (2.0, ["a constant force"])]
+)
+def test_a_mass_that_is_absurdly_off_explains_nothing(off: float, names: list[str]) -> None:
+    base = replace(AXIS, inertia=NumberPrior(AXIS.inertia.value * (1.0 + off)))
+    fits = MachineFits(uniform_records(axis(), base), base, [], None)
+    training, _ = fits.blocks()
+    parts = machine_parts(base, is_driven=True)
+    known = fits.priors, fits.nonnegative
+    columns = fits.columns(fits.base_terms)
+    assert [*parts_that_may_be_off(training, columns, parts, base, known)] == names

@@ -17,7 +17,12 @@ from impactcell.discrepancy.machine.explained_by_numbers import (
 )
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
 from impactcell.discrepancy.machine.held_numbers import numbers_held, told_from_number
-from impactcell.discrepancy.machine.look_alikes import alike_note, like_the_machine, machine_parts
+from impactcell.discrepancy.machine.look_alikes import (
+    alike_note,
+    like_the_machine,
+    machine_parts,
+    parts_that_may_be_off,
+)
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
 from impactcell.discrepancy.machine.record_constants import constants_note
@@ -62,6 +67,8 @@ def establish(
     numbers = numbers_held(fits.base, fits.records, fits.scale)
     if enough:
         parts = machine_parts(fits.base, is_driven=any(record.force.any() for record in fits.records))
+        known = fits.priors, fits.nonnegative
+        parts = parts_that_may_be_off(training, fits.columns(base_terms), parts, fits.base, known)
         candidates = [
             choice
             for choice in fits.candidates

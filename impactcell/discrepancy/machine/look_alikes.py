@@ -5,9 +5,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from impactcell.discrepancy.machine.base_model import BaseModel, TermChoice
+from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, TermChoice
+from impactcell.discrepancy.machine.held_numbers import FARTHEST_SHARE
 from impactcell.discrepancy.machine.nuisance_priors import OFFSET
-from impactcell.discrepancy.machine.regression import RIDGE, Blocks
+from impactcell.discrepancy.machine.regression import RIDGE, Blocks, fit_blocks
 from impactcell.discrepancy.machine.trials import ChosenTerm
 from impactcell.discrepancy.machine.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.weak_form import Column
@@ -38,6 +39,41 @@ def machine_parts(base: BaseModel, *, is_driven: bool) -> dict[str, Column]:
     if not base.has_free_offset:
         parts["a constant force"] = OFFSET
     return parts
+
+
+def parts_that_may_be_off(
+    blocks: Blocks,
+    columns: Sequence[Column],
+    parts: Mapping[str, Column],
+    base: BaseModel,
+    known: tuple[Mapping[Column, NumberPrior], frozenset[Column]],
+) -> dict[str, Column]:
+    """Give the parts of a machine by which an error may explain what a model leaves.
+
+    Of a spring that bends as q³ is what moves a light damped part, but a mass that had to be nought for it
+    explains nothing: what looks like such a part is to be looked for.
+
+    Parameters
+    ----------
+    blocks : Blocks
+    columns : sequence of Column
+        Of the model.
+    parts : mapping
+        As `machine_parts` gives them.
+    base : BaseModel
+    known : (mapping, frozenset)
+        Priors of the nuisances, and strengths that may not be negative.
+    """
+    priors, nonnegative = known
+    farthest = dict.fromkeys(("inertia", "drive"), FARTHEST_SHARE)
+    farthest["gravity"] = FARTHEST_SHARE * abs(base.gravity_torque.value) or math.inf
+
+    def error(part: Column) -> float:
+        others = [column for column in columns if column != part]
+        free = {column: prior for column, prior in priors.items() if column != part}
+        return abs(float(fit_blocks(blocks, [*others, part], free, nonnegative).coefficients[-1]))
+
+    return {name: part for name, part in parts.items() if error(part) <= farthest.get(name, math.inf)}
 
 
 def like_the_machine(blocks: Blocks, term: ChosenTerm, parts: Iterable[Column], base: BaseModel) -> bool:

@@ -167,6 +167,7 @@ def _beside_smooth_force(step: SelectionStep, term: Trial, free: Mapping[str, fl
     if reason:
         return replace(step, accepted=None, tied_with=(), reason=step.reason or reason)
     others = [trial for trial in step.trials if trial.term.choice.name != most]
+    term = next((one for one in step.trials if one.term.choice.name == most and one.at_end), term)
     if term.at_end and not step.reason:
         step = replace(step, trials=(term, *others), reason=END_OF_RANGE)
     if term.at_end or term.gain <= 0.0:
