@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import takewhile
+from typing import NamedTuple
 
 from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.evidence import FallOfGap
@@ -43,6 +44,19 @@ SETTLED = 1e-3
 """Relative move of a shape from one round to the next up to which it has settled [1]."""
 
 
+class _Proof(NamedTuple):
+    """Blocks by some weights, models with no, one and two terms, and how the held-out gap falls with each.
+
+    `is_hidden`: a term's own friction hides by these weights that the gap is open without it.
+    """
+
+    training: Blocks
+    held_out: Blocks
+    models: list[FittedModel]
+    falls: dict[str, FallOfGap]
+    is_hidden: bool
+
+
 def establish(
     fits: MachineFits, notes: list[str], seed: int, contradicted: frozenset[str] = frozenset()
 ) -> MachineFinding:
@@ -52,7 +66,8 @@ def establish(
     more with them.
 
     The rows are weighed by what the base model leaves of them while terms are looked for; what is found is
-    proved once more with weights by its own remainder, so that gaps before and after have the same ones.
+    proved once more with weights by its own remainder, so that gaps before and after have the same ones; but
+    for a term whose own friction hides by them what it explains (`_prove`).
     """
     base_terms = fits.base_terms
     for turn in range(1, MOST_WEIGHINGS + 1):
@@ -83,21 +98,22 @@ def establish(
         notes += [step.note for step in steps if step.note]
     proposed = [step.accepted.term for step in steps if step.accepted is not None]
     proven = [*takewhile(lambda term: term.choice.name not in contradicted, proposed)]
-    models, falls = _prove(fits, base_terms, proven, seed)
-    for turn in range(1, MOST_WEIGHINGS + 1 if falls else 0):
-        before = models[-1].terms
-        fits.weigh(models[-1])
-        models, falls = _prove(
-            fits, base_terms, [term for term in proposed if term.choice.name in falls], seed
-        )
-        if turn >= WEIGHINGS and _is_settled(before, models[-1].terms):
+    by_base = proof = _prove(fits, base_terms, proven, seed)
+    for turn in range(1, MOST_WEIGHINGS + 1 if proof.falls else 0):
+        before = proof.models[-1].terms
+        fits.weigh(proof.models[-1])
+        still = [term for term in proposed if term.choice.name in proof.falls]
+        proof = _prove(fits, base_terms, still, seed, by_base)
+        if turn >= WEIGHINGS and _is_settled(before, proof.models[-1].terms):
             break
+    models, falls = proof.models, proof.falls
     training, held_out = fits.blocks()
     if falls:
         steps = _with_ties_of_now(_search(fits, training, candidates), fits.columns(base_terms), steps)
         notes = [*notes, *absent_gravity_notes(steps)]
     nominal, final = models[0], models[-1]
     settled = training, held_out
+    without = by_base if proof.is_hidden else proof
     if falls and not fits.base.delay_s.is_held:
         # Blocks are linear in the delay about that of the base model, which took over what the terms explain.
         final = fits.fit(final.terms, settle=True)
@@ -121,9 +137,9 @@ def establish(
         final=with_shape_intervals(fits, final),
         training=training,
         held_out=held_out,
-        train_gaps=(gap(training, nominal), gap(settled[0], final)),
+        train_gaps=(gap(without.training, without.models[0]), gap(settled[0], final)),
         expected=expected_gap(settled[1], final),
-        fall=fall_of_gap(held_out, nominal, final, seed, settled[1]),
+        fall=fall_of_gap(without.held_out, without.models[0], final, seed, settled[1]),
         held_spans=fits.held_spans(),
         remainder=remainder_of(fits.rows(), final, fits.records),
         block_s=fits.block_s,
@@ -144,20 +160,32 @@ def _search(fits: MachineFits, training: Blocks, candidates: Sequence[TermChoice
 
 
 def _prove(
-    fits: MachineFits, base_terms: tuple[ChosenTerm, ...], proposed: Sequence[ChosenTerm], seed: int
-) -> tuple[list[FittedModel], dict[str, FallOfGap]]:
-    """Models with no, one and two of the terms proposed, as far as the held-out gap falls with each."""
+    fits: MachineFits,
+    base_terms: tuple[ChosenTerm, ...],
+    proposed: Sequence[ChosenTerm],
+    seed: int,
+    by_base: _Proof | None = None,
+) -> _Proof:
+    """Prove no, one and two of the terms proposed, as far as the held-out gap falls with each.
+
+    A term whose own friction makes rows at rest so doubtful that nothing shows without it either has proved
+    itself by the weights of the base model, `by_base`; what is told is each model by its own.
+    """
     terms = fits.with_best_shapes((*base_terms, *proposed), len(base_terms))
-    _, held_out = fits.blocks()
+    training, held_out = fits.blocks()
     models, falls = [fits.fit(base_terms, settle=False)], dict[str, FallOfGap]()
+    is_hidden = False
     for count in range(len(base_terms) + 1, len(terms) + 1):
         after = fits.fit(terms[:count], settle=False)
         fall = fall_of_gap(held_out, models[-1], after, seed)
+        if by_base is not None and fall.is_hidden:
+            is_hidden = True
+            fall = fall_of_gap(by_base.held_out, by_base.models[len(falls)], after, seed, held_out)
         if not fall.is_real:
             break
         models.append(after)
         falls[terms[count - 1].choice.name] = fall
-    return models, falls
+    return _Proof(training, held_out, models, falls, is_hidden)
 
 
 def _is_settled(before: Sequence[ChosenTerm], now: Sequence[ChosenTerm]) -> bool:

@@ -1,5 +1,6 @@
 """What speaks for a term: the fall of the held-out gap with it, and its strength where no gap shows."""
 
+import math
 from dataclasses import dataclass
 
 from impactcell.discrepancy.search import MAX_P_VALUE, MIN_CLOSED_SHARE
@@ -28,6 +29,11 @@ class FallOfGap:
     def is_real(self) -> bool:
         """Whether held-out blocks confirm it."""
         return self.is_real_among(1)
+
+    @property
+    def is_hidden(self) -> bool:
+        """Whether no gap is open without the term, and held-out blocks want it all the same."""
+        return math.isnan(self.closed) and self.p_value <= MAX_P_VALUE
 
     def is_real_among(self, tests: int) -> bool:
         """Whether held-out blocks confirm it where so many tests share the error of one (Bonferroni)."""

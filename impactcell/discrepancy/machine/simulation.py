@@ -1,9 +1,9 @@
 """Open-loop simulation of held-out stretches: a model runs by itself, from the first state of each.
 
 Steps are Moreau's: position at the half step, all forces but friction at once, and friction as an impulse
-that may stop the part and never turns it. A command is held from its sample to the next, and a part that it
-stops within a step goes on from rest. Where the force is predicted, the measured motion is the input, and
-both forces are averaged as the regression averages.
+that may stop the part and never turns it; a part that is stopped within a step goes on from rest. A command
+is held from its sample to the next. Where the force is predicted, the measured motion is the input, and both
+forces are averaged as the regression averages.
 """
 
 import math
@@ -213,8 +213,6 @@ def _runner(
     far = RUNAWAY * max(float(np.abs(record.position).max()) for record in records)
     fast = far / float(step.max())
     half = 0.5 * step
-    commanded = np.array([record.force_is_command for record in records])
-    some, every = bool(commanded.any()), bool(commanded.all())
     is_eccentric = bool(eccentricity.any())
 
     def reading(angle: Samples) -> Samples | float:
@@ -229,21 +227,14 @@ def _runner(
         outside = force - sine_torque * sine
         if by_zero:
             outside = outside + by_zero * np.cos(middle)
-        ahead = v
+        ahead = mean = v
         for _ in range(2):
             smooth, friction = law(middle, 0.5 * (v + ahead), load)
             freely = v + step * (outside + smooth) / inertia
             held = step * np.maximum(friction, 0.0) / inertia
-            if not every:
-                ahead = np.sign(freely) * _within(np.abs(freely) - held, 0.0, fast)
-            if some:
-                turned, mean = _with_a_stop(v, freely, held)
-                turned = _within(turned, -fast, fast)
-                ahead = turned if every else np.where(commanded, turned, ahead)
-        there = middle + half * ahead
-        if some:
-            there = np.where(commanded, q + step * mean, there)
-        return _within(there, -far, far), ahead
+            ahead, mean = _with_a_stop(v, freely, held)
+            ahead = _within(ahead, -fast, fast)
+        return _within(q + step * mean, -far, far), ahead
 
     def run(state: Samples, count: int, constant: Samples | float = 0.0) -> Samples:
         slope = eccentricity @ np.stack([-np.sin(state[0]), np.cos(state[0])])
