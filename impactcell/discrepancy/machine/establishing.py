@@ -83,7 +83,7 @@ def establish(
     if enough:
         parts = machine_parts(fits.base, is_driven=any(record.force.any() for record in fits.records))
         known = fits.priors, fits.nonnegative
-        parts = parts_that_may_be_off(training, fits.columns(base_terms), parts, fits.base, known)
+        parts = parts_that_may_be_off(training, fits.columns(base_terms), parts, known)
         candidates = [
             choice
             for choice in fits.candidates

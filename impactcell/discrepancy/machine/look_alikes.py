@@ -45,13 +45,12 @@ def parts_that_may_be_off(
     blocks: Blocks,
     columns: Sequence[Column],
     parts: Mapping[str, Column],
-    base: BaseModel,
     known: tuple[Mapping[Column, NumberPrior], frozenset[Column]],
 ) -> dict[str, Column]:
     """Give the parts of a machine by which an error may explain what a model leaves.
 
     Of a spring that bends as q³ is what moves a light damped part, but a mass that had to be nought for it
-    explains nothing: what looks like such a part is to be looked for.
+    explains nothing: what looks like such a mass is to be looked for.
 
     Parameters
     ----------
@@ -60,20 +59,17 @@ def parts_that_may_be_off(
         Of the model.
     parts : mapping
         As `machine_parts` gives them.
-    base : BaseModel
     known : (mapping, frozenset)
         Priors of the nuisances, and strengths that may not be negative.
     """
+    mass = parts.get("inertia")
+    if mass is None:
+        return dict(parts)
     priors, nonnegative = known
-    farthest = dict.fromkeys(("inertia", "drive"), FARTHEST_SHARE)
-    farthest["gravity"] = FARTHEST_SHARE * abs(base.gravity_torque.value) or math.inf
-
-    def error(part: Column) -> float:
-        others = [column for column in columns if column != part]
-        free = {column: prior for column, prior in priors.items() if column != part}
-        return abs(float(fit_blocks(blocks, [*others, part], free, nonnegative).coefficients[-1]))
-
-    return {name: part for name, part in parts.items() if error(part) <= farthest.get(name, math.inf)}
+    others = [column for column in columns if column != mass]
+    free = {column: prior for column, prior in priors.items() if column != mass}
+    error = float(fit_blocks(blocks, [*others, mass], free, nonnegative).coefficients[-1])
+    return {name: part for name, part in parts.items() if part != mass or abs(error) <= FARTHEST_SHARE}
 
 
 def like_the_machine(blocks: Blocks, term: ChosenTerm, parts: Iterable[Column], base: BaseModel) -> bool:
