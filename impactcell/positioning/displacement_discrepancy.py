@@ -94,7 +94,7 @@ def swing_m(before: float, displacement: float, after: float, stroke: float, ind
     Parameters
     ----------
     before, displacement, after : float
-        Of the model at strokes shorter and longer by `SWING_SHARE`, and at the stroke, m.
+        Of the model at a stroke shorter by `SWING_SHARE`, at the stroke itself, and at one longer by it, m.
     """
     if math.isinf(stroke) or not displacement > 0.0:
         return 0.0

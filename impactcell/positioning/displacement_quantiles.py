@@ -36,7 +36,8 @@ from impactcell.positioning.planner_posterior import (
     STIFFNESS,
     VISCOUS,
     PlannerPosterior,
-    known_at,
+    cov_at,
+    mean_at,
 )
 from impactcell.positioning.scatter_hypotheses import quantile_scales
 from impactcell.records import Samples
@@ -89,7 +90,7 @@ def parameter_scenarios(
 
     `swing` is `Scenarios.swing_std` where it is not the posterior's own.
     """
-    mean, cov = known_at(posterior, part, place)
+    cov = cov_at(posterior, part, place)
     scales = quantile_scales(posterior.mixed_scatter, z)
     scatter = scales[:, 0]
     known = cov[FRICTION, FRICTION]
@@ -108,7 +109,7 @@ def parameter_scenarios(
     weights_along *= ACROSS_Z
     variances, axes = np.linalg.eigh(weights_left)
     theta = np.empty((z.size + 2 * ACROSS, PARAMETERS + FEATURES))
-    theta[:] = mean
+    theta[:] = mean_at(posterior, part, place)
     theta[: z.size] += z[:, None] * along
     # ln(1 + s z) to second order: a factor of friction is normal, not log-normal
     theta[: z.size, FRICTION] -= 0.5 * np.minimum(sigma, WIDEST_CORRECTED) ** 2 * z**2

@@ -26,7 +26,8 @@ from impactcell.positioning.planner_posterior import (
     PARAMETERS,
     PlannerPosterior,
     anticipate_learning,
-    known_at,
+    cov_at,
+    mean_at,
 )
 from impactcell.positioning.quadrature import COARSE_Z, coarse_nodes
 from impactcell.positioning.safety_limits import allowed_strokes
@@ -216,8 +217,8 @@ class LookaheadTable:
 
 def stiffest(posterior: PlannerPosterior, part: Samples, place: Samples) -> Samples:
     """Plant (k, b, mu_s, mu_k, k_v) that presses hardest, within three standard deviations."""
-    mean, cov = known_at(posterior, part, place)
-    worst = mean + 3.0 * np.sqrt(np.diag(cov))
+    std = np.sqrt(np.diag(cov_at(posterior, part, place)))
+    worst = mean_at(posterior, part, place) + 3.0 * std
     plant: Samples = plant_parameters(worst[None])[0] * np.array([1.0, 1.0, 1.1, 1.1, 1.0])
     return plant
 
@@ -251,8 +252,7 @@ def build_lookahead(
 
 def indentation_of(posterior: PlannerPosterior, part: Samples, place: Samples) -> float:
     """Return the static indentation delta (m) of a part that is pushed where it lies."""
-    mean, _ = known_at(posterior, part, place)
-    plant = plant_parameters(mean[None])[0]
+    plant = plant_parameters(mean_at(posterior, part, place)[None])[0]
     return float(plant[3] * part[0] * part[1] / plant[0])
 
 

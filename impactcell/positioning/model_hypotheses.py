@@ -121,12 +121,14 @@ def join(
     )
 
 
+def swing_stds(posterior: PlannerPosterior) -> Samples:
+    """Return `SWING` for each of its hypotheses; 0 for a posterior that has one alone."""
+    return SWING if posterior.probabilities.size == SWING.size else np.zeros(1)
+
+
 def swing_std(posterior: PlannerPosterior) -> float:
-    """Return the standard deviation of `SWING` over all hypotheses; 0 for a posterior that has one."""
-    probabilities = posterior.probabilities
-    if probabilities.size < SWING.size:
-        return 0.0
-    return math.sqrt(float(probabilities @ SWING**2))
+    """Return the standard deviation of the swing over all hypotheses."""
+    return math.sqrt(float(posterior.probabilities @ swing_stds(posterior) ** 2))
 
 
 def reweighted(probabilities: Samples, log_evidence: Samples) -> Samples:

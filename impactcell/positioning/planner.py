@@ -242,9 +242,7 @@ class TapPlanner:
         if not lookahead.furthest_m > 0.0:
             return unmoved(self._limits, self._posterior, part, place)
         space = self._limits.space(self._posterior, part, place, lookahead.strokes)
-        scenarios = parameter_scenarios(
-            self._posterior, Z, part, place, model_hypotheses.swing_std(self._posterior)
-        )
+        scenarios = parameter_scenarios(self._posterior, Z, part, place)
 
         def stays(velocity: float, strokes: Samples) -> NDArray[np.bool_]:
             band = displacement_band(self._posterior, velocity, strokes, part, place)

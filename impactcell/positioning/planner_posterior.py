@@ -121,17 +121,23 @@ def with_single_gaussian(posterior: PlannerPosterior, mean: Samples, cov: Sample
     )
 
 
-def known_at(posterior: PlannerPosterior, part: Samples, place: Samples) -> tuple[Samples, Samples]:
-    """Mean and covariance with the friction that there is where the part lies, in place of that at 0.
+def mean_at(posterior: PlannerPosterior, part: Samples, place: Samples) -> Samples:
+    """Mean with the friction that there is where the part lies, in place of that at 0.
 
     `part` and `place` as in `impactcell.positioning.displacement_quantiles.Scenarios`.
     """
+    mean = posterior.mean
+    mean[FRICTION] -= friction_features(part, place) @ mean[PARAMETERS:]
+    return mean
+
+
+def cov_at(posterior: PlannerPosterior, part: Samples, place: Samples) -> Samples:
+    """Covariance with that friction."""
     xi = friction_features(part, place)
-    mean, cov = posterior.mean, posterior.cov
-    mean[FRICTION] -= xi @ mean[PARAMETERS:]
+    cov = posterior.cov
     cov[FRICTION] -= xi @ cov[PARAMETERS:]
     cov[:, FRICTION] -= cov[:, PARAMETERS:] @ xi
-    return mean, cov
+    return cov
 
 
 def prior_of_plant(

@@ -26,10 +26,10 @@ from impactcell.positioning.mixture_components import (
     within_most_components,
 )
 from impactcell.positioning.model_hypotheses import (
-    SWING,
     join,
     parts_of,
     reweighted,
+    swing_stds,
     with_evidence_of_a_tap,
 )
 from impactcell.positioning.planner_posterior import (
@@ -89,10 +89,9 @@ def update_posterior(
         Standard deviation with which a displacement is measured.
     """
     model = response if isinstance(response, TapModel) else TapModel(response)
-    parts = parts_of(posterior)
     updates = [
         update_hypothesis(part, model._replace(swing_m=std * model.swing_m), moved_m, noise_m)
-        for part, std in zip(parts, SWING if len(parts) == SWING.size else np.zeros(1), strict=True)
+        for part, std in zip(parts_of(posterior), swing_stds(posterior), strict=True)
     ]
     parts = [part for part, _ in updates]
     log_evidence = np.array([evidence for _, evidence in updates])

@@ -18,7 +18,7 @@ from impactcell.positioning.displacement_discrepancy import (
     swing_m,
 )
 from impactcell.positioning.displacement_quantiles import plant_parameters
-from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior, known_at
+from impactcell.positioning.planner_posterior import PARAMETERS, PlannerPosterior, mean_at
 from impactcell.positioning.tap import Tap
 from impactcell.records import Samples
 
@@ -49,7 +49,7 @@ class TapModel(NamedTuple):
 def model_of_tap(tap: Tap, posterior: PlannerPosterior, part: Samples) -> TapModel:
     """Model of a tap on a part; `part` as in `impactcell.physics.closed_form.displacements`."""
     place = np.array([tap.position_m, float(tap.direction)])
-    mean, _ = known_at(posterior, part, place)
+    mean = mean_at(posterior, part, place)
     plant = plant_parameters(mean[None, :PARAMETERS])[0]
     indentation = float(plant[3] * part[0] * part[1] / plant[0])
 

@@ -245,11 +245,8 @@ def _solve(
             # The prior's weight goes by the scatter of what is left, known after a first fit.
             matrix = gram + smooth + np.diag(weight)
             matrix = matrix + RIDGE * np.diag(np.diag(matrix))
-            if free.size == held.size:
-                coefficients = _solved(matrix, right)
-            else:
-                beside = right[free] - matrix[np.ix_(free, np.flatnonzero(held))] @ coefficients[held]
-                coefficients[free] = _solved(matrix[np.ix_(free, free)], beside)
+            beside = right[free] - matrix[np.ix_(free, np.flatnonzero(held))] @ coefficients[held]
+            coefficients[free] = _solved(matrix[np.ix_(free, free)], beside)
             left = max(total[-1, -1] - 2.0 * coefficients @ right + coefficients @ gram @ coefficients, 0.0)
             weight = _weight(left / (blocks.pieces_each * count), columns, priors)
         beyond = ~held & ((coefficients < lower) | (coefficients > upper))

@@ -276,12 +276,7 @@ def finer_grid(grid: Sequence[float], shape: float) -> tuple[float, ...]:
 
 
 def _averaged(values: Samples, weight: Samples, centres: IndexArray) -> Samples:
-    windows = _windows(values, len(weight))
-    averaged: Samples = windows[centres - len(weight) // 2] @ weight
+    half = len(weight) // 2
+    windows = np.lib.stride_tricks.sliding_window_view(values, len(weight))
+    averaged: Samples = windows[centres - half] @ weight
     return averaged
-
-
-def _windows(values: Samples, size: int) -> Samples:
-    """So many samples from each on, in a view: numpy's own asks for more, and takes longer than the sum."""
-    lined = np.ascontiguousarray(values, dtype=np.float64)
-    return np.ndarray((lined.size - size + 1, size), lined.dtype, lined, strides=lined.strides * 2)

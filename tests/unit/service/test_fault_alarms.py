@@ -174,15 +174,20 @@ async def test_a_start_of_the_service_is_no_fault_of_the_link(
     assert [a.active for a in await transitions(task, tmp_path, name)] == [True]
 
 
+def started(task: CellTask, monkeypatch: pytest.MonkeyPatch) -> LiveFeed:
+    """Publish the start of a task whose process has lacked no machine code; give what the page is told."""
+    task._publisher.feed = feed = LiveFeed([task.cell.name])
+    monkeypatch.setattr(compilation, "_lacked", threading.Event())
+    task._publish_restored()
+    return feed
+
+
 @pytest.mark.parametrize("task", [False], indirect=True)
 async def test_a_module_that_was_not_asked_yet_is_not_told_to_be_lost(
     task: CellTask, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The page said so in red for the minutes that a new machine compiles for."""
-    feed = LiveFeed([task.cell.name])
-    task._publisher.feed = feed
-    monkeypatch.setattr(compilation, "_lacked", threading.Event())
-    task._publish_restored()
+    feed = started(task, monkeypatch)
     card = feed.views[task.cell.name].card()
     assert card["freshness"] == "starting"
     assert card["link_reason"]["en"] == task.health.reason
@@ -202,10 +207,7 @@ async def test_a_start_says_that_it_compiles_only_where_it_does(
     task: CellTask, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each start said so, also where the machine code was on the disk."""
-    feed = LiveFeed([task.cell.name])
-    task._publisher.feed = feed
-    monkeypatch.setattr(compilation, "_lacked", threading.Event())
-    task._publish_restored()
+    feed = started(task, monkeypatch)
     assert feed.views[task.cell.name].card()["freshness"] == "starting"
     monkeypatch.setattr("impactcell.service.cell_task.TICK_S", 0.0)
     announce_compilation()
