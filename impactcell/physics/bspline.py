@@ -21,6 +21,8 @@ def spline(u: float, p: FloatPointer, spans: int) -> float:
         a * s * s * s + b * (3.0 * t * t * t - 6.0 * t * t + 4.0)
         + c * (1.0 + 3.0 * t + 3.0 * t * t - 3.0 * t * t * t) + d * t * t * t
     ) / 6.0  # fmt: skip
+    if w == inside:
+        return value
     slope = (-a * s * s + b * (3.0 * t * t - 4.0 * t) + c * (1.0 + 2.0 * t - 3.0 * t * t) + d * t * t) / 2.0
     return value + slope * (w - inside)
 
@@ -56,10 +58,12 @@ def tensor_spline(u: float, w: float, p: FloatPointer, spans: int) -> float:
             a * s * s * s + b * (3.0 * t * t * t - 6.0 * t * t + 4.0)
             + c * (1.0 + 3.0 * t + 3.0 * t * t - 3.0 * t * t * t) + d * t * t * t
         ) / 6.0  # fmt: skip
-        rise = (
-            -a * s * s + b * (3.0 * t * t - 4.0 * t) + c * (1.0 + 2.0 * t - 3.0 * t * t) + d * t * t
-        ) / 2.0
-        total += (weight + slope * (y - v)) * (value + rise * (x - inside))
+        if x != inside:
+            rise = (
+                -a * s * s + b * (3.0 * t * t - 4.0 * t) + c * (1.0 + 2.0 * t - 3.0 * t * t) + d * t * t
+            ) / 2.0
+            value += rise * (x - inside)
+        total += (weight + slope * (y - v)) * value
     return total
 
 

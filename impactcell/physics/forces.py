@@ -4,18 +4,18 @@ Every law is evaluated by its smooth continuation: what is switched on is said b
 the sign of the state, so that a step that runs past an event is still a step of a smooth equation.
 """
 
-from impactcell.numerics.jit import FloatPointer, compiled, invoke
+from impactcell.numerics.jit import FloatPointer, compiled, inlined, invoke
 from impactcell.physics import memory_layout as at
 from impactcell.physics.memory_layout import SmoothPhase
 
 
-@compiled
+@inlined
 def evaluate_law(place: int, a: float, b: float, c: float, d: float, phase: SmoothPhase) -> float:
     """Value of the law listed at this place of `laws` for its four numbers, as `LawKind` has them."""
     return invoke(phase.laws[place], a, b, c, d, phase.parameters, phase.laws[place + 1])
 
 
-@compiled
+@inlined
 def actuator_speed(t: float, state: FloatPointer, phase: SmoothPhase) -> float:
     """Y' = v times the laws of its run-up, less the speed the laws of its load take away [m/s]."""
     if phase.contact_mode[at.RUNNING] == 0:
@@ -28,7 +28,7 @@ def actuator_speed(t: float, state: FloatPointer, phase: SmoothPhase) -> float:
     return speed
 
 
-@compiled
+@inlined
 def compression(state: FloatPointer, speed: float, phase: SmoothPhase) -> float:
     """Contact force while touching, before it is clipped at zero [N]."""
     d = state[at.TRAVEL] - state[at.ADVANCE]
@@ -41,7 +41,7 @@ def compression(state: FloatPointer, speed: float, phase: SmoothPhase) -> float:
     return force
 
 
-@compiled
+@inlined
 def contact_force(state: FloatPointer, speed: float, phase: SmoothPhase) -> float:
     """Force of the actuator on the part, positive in compression, negative in adhesion [N]."""
     if phase.contact_mode[at.ZONE] == at.TOUCHING:
@@ -53,7 +53,7 @@ def contact_force(state: FloatPointer, speed: float, phase: SmoothPhase) -> floa
     return force
 
 
-@compiled
+@inlined
 def body_force(t: float, state: FloatPointer, phase: SmoothPhase) -> float:
     """Sum up the forces on the part other than contact and Coulomb friction, along the tap [N]."""
     direction = phase.parameters[at.DIRECTION]
@@ -68,7 +68,7 @@ def body_force(t: float, state: FloatPointer, phase: SmoothPhase) -> float:
     return direction * force
 
 
-@compiled
+@inlined
 def friction_scale(advance: float, phase: SmoothPhase) -> float:
     """Product of the laws by which friction varies along the table [1]."""
     scale = 1.0
@@ -78,7 +78,7 @@ def friction_scale(advance: float, phase: SmoothPhase) -> float:
     return scale
 
 
-@compiled
+@inlined
 def kinetic_friction(advance: float, speed: float, phase: SmoothPhase) -> float:
     """Magnitude of Coulomb friction in slip at `speed` >= 0 [N]."""
     mu = phase.parameters[at.MU_K]
@@ -101,7 +101,7 @@ def breakaway_force(advance: float, phase: SmoothPhase) -> float:
     return max(static, kinetic_friction(advance, 0.0, phase))
 
 
-@compiled
+@inlined
 def derivative(t: float, state: FloatPointer, phase: SmoothPhase, out: FloatPointer, begin: int) -> None:
     """Equations of motion (1)-(3) of the present phase, into `out` from index `begin` on."""
     speed = actuator_speed(t, state, phase)

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from scipy.integrate import DOP853
 
-from impactcell.numerics.jit import FloatPointer, compiled
+from impactcell.numerics.jit import FloatPointer, compiled, inlined
 from impactcell.physics import memory_layout as at
 from impactcell.physics.forces import derivative
 from impactcell.physics.memory_layout import SmoothPhase, StepBuffers
@@ -111,7 +111,7 @@ def build_interpolant(t: float, h: float, phase: SmoothPhase, step: StepBuffers)
             out[(4 + j) * at.STATE_WIDTH + i] = h * total
 
 
-@compiled
+@inlined
 def interpolate(theta: float, interpolant: FloatPointer, i: int) -> float:
     """Component i of the state at the fraction `theta` of the step."""
     rest = 1.0 - theta
@@ -125,7 +125,7 @@ def interpolate(theta: float, interpolant: FloatPointer, i: int) -> float:
     return value + interpolant[i]
 
 
-@compiled
+@inlined
 def interpolate_state(theta: float, n: int, step: StepBuffers) -> None:
     """Write the state at the fraction `theta` of the step into `trial_state`."""
     for i in range(n):

@@ -47,6 +47,17 @@ def test_of_two_processes_one_compiles_and_an_edited_callee_is_compiled_anew(tmp
     assert run(tmp_path) == ["3.0", "0"]
 
 
+@pytest.mark.slow
+def test_what_is_compiled_into_its_callers_is_compiled_anew_with_them(tmp_path: Path) -> None:
+    callee = CALLEE.replace("compiled", "inlined")
+    (tmp_path / "caller.py").write_text(CALLER)
+    (tmp_path / "callee.py").write_text(callee.format(2.0))
+    assert run(tmp_path) == ["2.0", "0"]
+    assert run(tmp_path) == ["2.0", "1"]
+    (tmp_path / "callee.py").write_text(callee.format(3.0))
+    assert run(tmp_path) == ["3.0", "0"]
+
+
 TOLD = (
     "from impactcell.numerics.compilation import on_compilation\non_compilation(lambda: print('compiling'))\n"
 )
