@@ -68,7 +68,11 @@ def test_coefficients_that_a_shot_does_not_come_to_have_no_derivative_there(plac
     assert reached is not None
     assert 0.1 < reached.mean() < 0.6
     everywhere = start.problem.constrained(start.problem.effects, replace(constraints, supports=()))
-    assert np.array_equal(start.problem.shared_jacobian(state), everywhere.shared_jacobian(state))
+    jacobian = start.problem.shared_jacobian(state)
+    assert np.array_equal(jacobian, everywhere.shared_jacobian(state))
+    # One coordinate alone, as a fit asks for at a bound.
+    last = len(theta) - 1
+    assert np.array_equal(start.problem.shared_derivative(state, last), jacobian[last])
 
 
 def test_a_penalty_draws_towards_zero_as_its_normal_equations_say() -> None:

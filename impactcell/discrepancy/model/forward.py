@@ -60,19 +60,26 @@ class ForwardModel:
             return None
         return [(shot.drive[0], shot.drive[1]) for shot in self.shots.items]
 
+    def with_effects(self, effects: tuple[str, ...]) -> Ensemble:
+        """Give the shots' taps with some effects at work."""
+        return self._ensemble.with_effects(effects)
+
     def names(self, effects: tuple[str, ...]) -> tuple[str, ...]:
         """Names of the plant's parameters: nominal four, then those of the effects."""
-        return self._ensemble.with_effects(effects).names
+        return self.with_effects(effects).names
 
     def samples(
         self,
-        effects: tuple[str, ...],
+        taps: Ensemble,
         parameters: Samples,
         shot_parameters: ShotParameters,
         only: NDArray[np.bool_] | None = None,
     ) -> Samples:
-        """Predicted samples, shape (N,), of all shots or some; not finite where the plant has no answer."""
-        out = _sample(self._ensemble.with_effects(effects), parameters, shot_parameters, only)
+        """Predicted samples, shape (N,), of all shots or some; not finite where the plant has no answer.
+
+        `taps` are those of `with_effects`.
+        """
+        out = _sample(taps, parameters, shot_parameters, only)
         if shot_parameters.shift_m.any():
             out += np.repeat(shot_parameters.shift_m, np.diff(self.shots.bounds))
         return out

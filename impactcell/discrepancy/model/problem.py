@@ -22,7 +22,7 @@ from impactcell.discrepancy.model.parameters import (
 from impactcell.discrepancy.model.reach import shots_reached
 from impactcell.discrepancy.model.shot_freedom import LARGEST_LOG_FACTOR, ShotFreedom
 from impactcell.discrepancy.model.shot_parameters import ShotParameters
-from impactcell.physics import LawKind
+from impactcell.physics import Ensemble, LawKind
 from impactcell.physics.effects import find_effect
 from impactcell.records import Samples
 
@@ -158,9 +158,14 @@ class Problem:
     @cached_property
     def _parameter_layout(self) -> tuple[tuple[int, ...], Samples]:
         """Where the coordinates' parameters lie in the plant's vector, and what is held there."""
-        names = self.forward.names(self.effects)
+        names = self._taps.names
         held = self.constraints.hold(names, default_parameters(names))
         return parameter_columns(self.coordinates, names), held
+
+    @cached_property
+    def _taps(self) -> Ensemble:
+        """The shots' taps with the model's effects at work."""
+        return self.forward.with_effects(self.effects)
 
     def penalty(self, theta: Samples) -> float:
         """Penalty of a free-form term's roughness, in squared standard deviations."""
@@ -171,7 +176,7 @@ class Problem:
     ) -> Samples:
         """Whitened residuals, shape (N,), of all shots or some."""
         parameters = self.plant_parameters(theta)
-        predicted = self.forward.samples(self.effects, parameters, shot_parameters, only)
+        predicted = self.forward.samples(self._taps, parameters, shot_parameters, only)
         return self.shots.whiten(np.subtract(self.shots.values, predicted, out=predicted))
 
     def evaluate(self, theta: Samples, shot_parameters: ShotParameters, spread: float) -> FitState:
@@ -197,20 +202,27 @@ class Problem:
         for column, coordinate in enumerate(self.coordinates):
             if by_factor is not None and self._is_common_factor(coordinate, state):
                 jacobian[column] = by_factor
-                continue
-            step = DIFFERENCE_STEP
-            if coordinate.form != "log":
-                step *= max(abs(state.theta[column]), SMALLEST_SCALE)
-            if state.theta[column] + step > coordinate.upper:
-                step = -step
-            moved = state.theta.copy()
-            moved[column] += step
-            only = None if reached is None else reached[column]
-            change = state.residual - self.residual(moved, state.shot_parameters, only)
-            if only is not None:
-                change[~np.repeat(only, self.sizes)] = 0.0
-            jacobian[column] = remove_jumps(change) / step
+            else:
+                only = None if reached is None else reached[column]
+                jacobian[column] = self.shared_derivative(state, column, only)
         return jacobian
+
+    def shared_derivative(
+        self, state: FitState, column: int, only: NDArray[np.bool_] | None = None
+    ) -> Samples:
+        """Differentiate the whitened prediction of all shots or some, shape (N,), by a shared coordinate."""
+        coordinate, step = self.coordinates[column], DIFFERENCE_STEP
+        if coordinate.form != "log":
+            step *= max(abs(state.theta[column]), SMALLEST_SCALE)
+        if state.theta[column] + step > coordinate.upper:
+            step = -step
+        moved = state.theta.copy()
+        moved[column] += step
+        change = state.residual - self.residual(moved, state.shot_parameters, only)
+        if only is not None:
+            change[~np.repeat(only, self.sizes)] = 0.0
+        derivative: Samples = remove_jumps(change) / step
+        return derivative
 
     def _is_common_factor(self, coordinate: Coordinate, state: FitState) -> bool:
         """Whether a step of this coordinate is the same step of every shot's friction factor."""

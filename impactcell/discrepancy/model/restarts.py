@@ -131,8 +131,10 @@ def _leave_flat_bounds(problem: Problem, state: FitState, most_steps: int, toler
     at_bound = ((state.theta <= lower) | (state.theta >= upper)) & (lower < upper)
     if not at_bound.any() or not state.cost < POLICY.hopeless_misfit * state.residual.size:
         return state
-    change = np.linalg.norm(problem.shared_jacobian(state), axis=1) * (upper - lower)
-    flat = at_bound & (change < 1.0)
+    flat = np.zeros_like(at_bound)
+    for column in np.flatnonzero(at_bound).tolist():
+        change = float(np.linalg.norm(problem.shared_derivative(state, column)))
+        flat[column] = change * (upper[column] - lower[column]) < 1.0
     if not flat.any():
         return state
     initial = np.array([coordinate.initial for coordinate in problem.coordinates])

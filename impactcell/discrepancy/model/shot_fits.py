@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, fields, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -182,5 +183,5 @@ def _pull(problem: Problem, state: FitState) -> Samples:
 
 def gram_of_shots(rows: Samples, bounds: IndexArray) -> Samples:
     """Products of rows, shape (r, N), with each other, shot by shot, shape (n, r, r)."""
-    parts = np.split(rows, bounds[1:-1], axis=1)
+    parts = [rows[:, begin:end] for begin, end in pairwise(bounds.tolist())]
     return np.array([part @ part.T for part in parts])
