@@ -22,16 +22,19 @@ import numpy as np
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 
+(
+    SLIDE, SLIDE_BY_SPEED, SLIDE_BY_MASS, POSITION, POSITION_BY_MASS, INDENTATION, INDENTATION_BY_MASS,
+    INDENTATION_BY_SPEED, LOSS, DIRECTION, DRAG, BREAKAWAY, BREAKAWAY_BY_SPEED, SHORT_PUSH,
+) = range(14)  # fmt: skip
+"""Weights, each a line of phi, psi, beta or xi.
+
+Of what slides by a share, by its speed and by its mass; of a friction that goes with the place, as a share of
+friction and as a force of its own; of the indentation, by mass and by velocity; of a loss in the contact; of
+friction that is higher one way; of a resistance that grows with speed; of breakaway, by velocity, and of
+short pushes after it.
+"""
 FEATURES = 14
-"""Weights of the discrepancy: one a line of phi, psi, beta or xi."""
-POSITION, POSITION_BY_MASS = 3, 4
-"""Weights of a friction that goes with the place, as a share of friction and as a force of its own."""
-DIRECTION = 9
-"""Weight of a friction that is higher one way."""
-INDENTATION = 5
-"""Weight by which the indentation is off."""
-BREAKAWAY = 11
-"""First weight of beta."""
+"""Number of weights."""
 LEARNED_STD = np.full(FEATURES, 0.012)
 """Of a weight after a handful of taps, for what is to be expected of the taps to come."""
 VELOCITY_M_S = 0.03
@@ -138,14 +141,14 @@ def discrepancy_features(
     lighter = MASS_KG / part[0]
     middle = place[0] + place[1] * (1.0 - 0.5 * f) * displacement
     along = f * (position_feature(middle) - position_feature(place[0]))
-    out[0] = f
-    out[1] = f * math.log(max(speed, 0.05))
-    out[2] = -f * math.log(lighter)
+    out[SLIDE] = f
+    out[SLIDE_BY_SPEED] = f * math.log(max(speed, 0.05))
+    out[SLIDE_BY_MASS] = -f * math.log(lighter)
     out[POSITION] = along
     out[POSITION_BY_MASS] = along * lighter
-    out[8] = f * min(LOSS_M / displacement, 1.0) * lighter
+    out[LOSS] = f * min(LOSS_M / displacement, 1.0) * lighter
     out[DIRECTION] = f * place[1]
-    out[10] = f * speed * lighter
+    out[DRAG] = f * speed * lighter
 
 
 @compiled
@@ -153,8 +156,8 @@ def indentation_features(velocity: float, part: Samples, place: Samples, out: Sa
     """Write psi of the taps at this velocity (m/s) to `out`, shape (FEATURES,); otherwise as above."""
     out[:] = 0.0
     out[INDENTATION] = 1.0
-    out[6] = math.log(part[0] / MASS_KG)
-    out[7] = math.log(velocity / VELOCITY_M_S)
+    out[INDENTATION_BY_MASS] = math.log(part[0] / MASS_KG)
+    out[INDENTATION_BY_SPEED] = math.log(velocity / VELOCITY_M_S)
     out[DIRECTION] = place[1]
 
 
@@ -175,16 +178,16 @@ def breakaway_features(velocity: float, stroke: float, indentation: float, out: 
     size, speed = math.log(stroke / indentation), math.log(velocity / VELOCITY_M_S)
     near = RISE * math.exp(-((size / WIDTH) ** 2))
     out[BREAKAWAY] = near
-    out[BREAKAWAY + 1] = near * speed
-    out[BREAKAWAY + 2] = RISE * math.exp(-(((size - BEYOND) / WIDTH) ** 2)) * speed
+    out[BREAKAWAY_BY_SPEED] = near * speed
+    out[SHORT_PUSH] = RISE * math.exp(-(((size - BEYOND) / WIDTH) ** 2)) * speed
 
 
 DEPENDS_ON = {
-    "slide": (0,),
-    "velocity": (1, 7, 10),
-    "mass": (2, 6),
+    "slide": (SLIDE,),
+    "velocity": (SLIDE_BY_SPEED, INDENTATION_BY_SPEED, DRAG),
+    "mass": (SLIDE_BY_MASS, INDENTATION_BY_MASS),
     "position": (POSITION, POSITION_BY_MASS),
-    "contact": (5, 8, 11, 12, 13),
+    "contact": (INDENTATION, LOSS, BREAKAWAY, BREAKAWAY_BY_SPEED, SHORT_PUSH),
     "direction": (DIRECTION,),
 }
 """Which weights speak of what."""

@@ -19,6 +19,7 @@ from impactcell.positioning.displacement_discrepancy import (
     BREAKAWAY_SHARE,
     FEATURES,
     HALTING_STD,
+    SLIDE,
 )
 from impactcell.positioning.mixture_components import (
     merge_components,
@@ -211,7 +212,7 @@ def update_component(
         slope = along @ regressed
         slope[PARAMETERS:size] += centre * model.features + model.indentation_m * model.breakaway
         by_itself, by_contact = abs(centre), abs(along[PARAMETERS + 1])
-        pushed = (1.0 - model.features[0]) * min(model.indentation_m, by_itself)
+        pushed = (1.0 - model.features[SLIDE]) * min(model.indentation_m, by_itself)
         breaking = BREAKAWAY_SHARE * model.indentation_m * float(model.breakaway[BREAKAWAY])
         by_contact = max(by_contact, pushed, breaking)
         noise = unmodelled + scatter[1] * by_itself**2 + scatter[2] * by_contact**2
