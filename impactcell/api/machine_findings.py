@@ -6,7 +6,7 @@ from pathlib import Path
 from impactcell.api.finding_files import write_files
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine import MachineFinding, investigate_machine
-from impactcell.discrepancy.report import json_text, machine_document, write_machine_reports
+from impactcell.discrepancy.report import json_text, law_table_text, machine_document, write_machine_reports
 from impactcell.errors import CampaignError
 from impactcell.settings.base_model import base_model_text, read_base_model
 
@@ -61,6 +61,8 @@ def write_machine_findings(finding: MachineFinding, data: Campaign, output: Path
             of_law = provenance | {"held-out gap after": f"{law.fall.after:.4g}"}
             text = base_model_text(proposed, data.excitation, of_law)
             (beside / f"{law.place}.yaml").write_text(text, encoding="utf-8")
+        elif law is not None:
+            (beside / f"{law.place}.csv").write_text(law_table_text(finding), encoding="utf-8")
         write_machine_reports(finding, document, source, beside)
 
     write_files(output, write)

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,30 +10,26 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from impactcell.api.machine_findings import write_machine_findings
-from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.machine import (
     MIN_NEED,
-    BaseModel,
     MachineFinding,
     NumberPrior,
-    Response,
-    TermChoice,
     investigate_machine,
     smooth_force,
+    smooth_waves,
 )
-from impactcell.discrepancy.machine.law_refusal import NOT_IN_ONE_PLACE
 from impactcell.discrepancy.machine.selection import SMOOTH_FORCE
 from impactcell.discrepancy.machine.smooth_force import NAME, SmoothForce, smooth_force_columns
 from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.weak_form import Column, Rows
 from impactcell.discrepancy.report.machine_page import format_need
-from impactcell.records import Capture, Channel, Samples
+from impactcell.records import Samples
+from tests.discrepancy.smooth_slide import SLIDE, Law, slide, wandering
 
 pytestmark = pytest.mark.slow
 
 OFFSET, FREE, OWN, DRAG = ("offset", 0.0, 0), ("free", 0.0, 0), ("own", 0.0, 0), ("drag", 0.0, 0)
 RANGES = {"position": (-0.3, 0.7), "speed": (0.0, 2.0), "load": (0.0, 1.0)}
-Law = Callable[[Samples, Samples], Samples]
 
 
 def motion(position: Samples, velocity: Samples) -> MotionState:
@@ -45,11 +41,11 @@ def motion(position: Samples, velocity: Samples) -> MotionState:
 def test_the_waves_make_a_force_of_one_size_and_correlation_length(length: float) -> None:
     """Squared exponential over half the ranges, away from the box, at which it is zero."""
     rng = np.random.default_rng(3)
-    reach = smooth_force.BOX - 1.4 * length
+    reach = smooth_waves.BOX - 1.4 * length
     x, u = rng.uniform(-reach, reach, (2, 40))
     columns = smooth_force_columns(motion(0.2 + 0.5 * x, 2.0 * u), np.sign(u), RANGES)
     waves = np.stack([values for name, values in columns.items() if name[0] == NAME], axis=1)
-    covariance = waves * smooth_force._spectrum(length) @ waves.T
+    covariance = waves * smooth_waves.spectrum(length) @ waves.T
     square = np.subtract.outer(x, x) ** 2 + np.subtract.outer(u, u) ** 2
     assert covariance == pytest.approx(np.exp(-0.5 * square / length**2), abs=0.06)
 
@@ -79,7 +75,7 @@ def dense(
     """
     values, spreads = [], []
     for length in smooth_force.LENGTHS:
-        shapes = waves * np.sqrt(smooth_force._spectrum(length))
+        shapes = waves * np.sqrt(smooth_waves.spectrum(length))
         shapes /= math.sqrt((shapes**2).sum() / sigma**2 / len(target))
         for level in smooth_force.LEVELS:
             covariance = sigma**2 * np.eye(len(target)) + level**2 * shapes @ shapes.T
@@ -161,56 +157,16 @@ def test_a_nuisance_of_which_no_row_knows_anything_changes_nothing() -> None:
     assert force.beside([OFFSET])([FREE], 1.0) == pytest.approx(0.0)
 
 
-SLIDE = BaseModel(
-    response=Response.FORCE,
-    inertia=NumberPrior(2.0, 0.1),
-    force_offset=NumberPrior(0.0, math.inf),
-    terms=(TermChoice("coulomb_friction"),),
-)
-
-
-def slide(law: Law, seed: int) -> Campaign:
-    """Six records of a slide that sums of three sines move, and what moves it in closed form."""
-    rng = np.random.default_rng(seed)
-    time_s = np.arange(0.0, 12.0, 4e-3)
-    shots = []
-    for number in range(1, 7):
-        position, velocity, acceleration = np.zeros((3, time_s.size))
-        for _ in range(3):
-            rate, phase = 2.0 * np.pi * rng.uniform(0.3, 1.2), rng.uniform(0.0, 2.0 * np.pi)
-            size = 0.08 * rng.uniform(0.5, 1.0)
-            position += size * np.sin(rate * time_s + phase)
-            velocity += size * rate * np.cos(rate * time_s + phase)
-            acceleration -= size * rate**2 * np.sin(rate * time_s + phase)
-        force = 2.0 * acceleration + 3.0 * np.tanh(velocity / 1e-3) - law(position, velocity)
-        force += 0.2 * rng.standard_normal(time_s.size)
-        shots.append(
-            Capture(number, math.nan, math.nan, Channel(time_s, force, None), Channel(time_s, position, None))
-        )
-    return Campaign(Excitation.DRIVEN, tuple(shots))
-
-
-def wandering(position: Samples, velocity: Samples) -> Samples:
-    """Smooth force that no term has [N]."""
-    return 0.15 * (
-        np.sin(11.0 * position - 2.5 * velocity + 0.4)
-        + np.sin(-6.0 * position - 3.3 * velocity + 2.0)
-        + np.sin(13.0 * position + 1.1 * velocity + 4.0)
-    )
-
-
 @pytest.fixture(scope="module")
 def nothing_but_a_smooth_force() -> MachineFinding:
     return investigate_machine(slide(wandering, 4), SLIDE)
 
 
-def test_a_smooth_force_alone_has_no_name_and_is_no_law(nothing_but_a_smooth_force: MachineFinding) -> None:
+def test_a_smooth_force_alone_has_no_name(nothing_but_a_smooth_force: MachineFinding) -> None:
     found = nothing_but_a_smooth_force
     assert found.fall.before > 1.5
     assert found.verdict == "unknown"
     assert not found.established
-    assert found.law is None
-    assert found.law_refused == NOT_IN_ONE_PLACE
 
 
 def test_it_is_the_smooth_force_that_refuses_the_term_that_closes_most(

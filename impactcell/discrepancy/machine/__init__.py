@@ -5,7 +5,7 @@ from impactcell.discrepancy.machine.evidence import FallOfGap
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, MachineLaw
 from impactcell.discrepancy.machine.held_out_stretch import drifts
 from impactcell.discrepancy.machine.investigation import investigate_machine
-from impactcell.discrepancy.machine.law_terms import LAW_PLACES, term_of
+from impactcell.discrepancy.machine.law_terms import LAW_PLACES, law_place, term_of
 from impactcell.discrepancy.machine.model_forces import motions
 from impactcell.discrepancy.machine.needs import MIN_NEED
 from impactcell.discrepancy.machine.open_loop_error import OpenLoopError
@@ -40,6 +40,7 @@ __all__ = [
     "Trial",
     "drifts",
     "investigate_machine",
+    "law_place",
     "motions",
     "shape_grid",
     "simulate_held_out",

@@ -68,6 +68,14 @@ class LawForm:
 
 
 @dataclass(frozen=True, slots=True)
+class Reach:
+    """Where a smooth force acts: positions from where to where, and largest speed."""
+
+    position: tuple[float, float]
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
 class TermChoice:
     """A term of the model.
 
@@ -79,11 +87,14 @@ class TermChoice:
         Column of `shots.csv`, where the term needs one.
     law : LawForm or None
         What acts there, where no term of the catalogue does.
+    reach : Reach or None
+        Of a smooth force of position and velocity.
     """
 
     identifier: str
     covariate: str = ""
     law: LawForm | None = None
+    reach: Reach | None = None
 
     @property
     def name(self) -> str:

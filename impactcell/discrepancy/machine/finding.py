@@ -95,10 +95,10 @@ class MachineLaw:
     ----------
     place : str
         Identifier of the place where it acts.
-    tested : (float, float)
-        Range of its covariate that was gone through.
+    tested : mapping
+        By covariate, the range that was gone through.
     spline : FittedFunction
-        Spline in that place, with its 95 % band.
+        Spline in that place, with its 95 % band; of two covariates along the first, at one of the second.
     choice : TermChoice or None
         Functional form that does as well as a spline; None where only the spline does.
     equivalents : tuple of str
@@ -110,13 +110,15 @@ class MachineLaw:
     fall : FallOfGap
         Of the held-out gap, from the one to the other.
     simulated : (OpenLoopError, OpenLoopError) or None
-        Of the held-out simulation, without and with it; None without a functional form.
+        Of the held-out simulation, without and with it; None of a spline in one place.
     beside : tuple of str
         What the base model holds and is left free without and with it.
+    slices : tuple of (float, FittedFunction)
+        Of two covariates, along the first at some values of the second.
     """
 
     place: str
-    tested: tuple[float, float]
+    tested: Mapping[str, tuple[float, float]]
     spline: FittedFunction
     choice: TermChoice | None
     equivalents: tuple[str, ...]
@@ -126,6 +128,7 @@ class MachineLaw:
     fall: FallOfGap
     simulated: tuple[OpenLoopError, OpenLoopError] | None
     beside: tuple[str, ...] = ()
+    slices: tuple[tuple[float, FittedFunction], ...] = ()
 
     @property
     def listed(self) -> str:

@@ -1,12 +1,13 @@
 """A smooth spline in one place of a machine's model, as smooth as blocks it was not fitted to want it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from impactcell.discrepancy.laws import BAND, DRAWN, FittedFunction, Tangent
+from impactcell.discrepancy.machine.base_model import NumberPrior
 from impactcell.discrepancy.machine.finding import FittedModel
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.regression import (
@@ -108,36 +109,45 @@ def with_spline(fits: MachineFits, blocks: Blocks, model: FittedModel, spline: F
     ))  # fmt: skip
 
 
-def tangent_of(
-    blocks: Blocks, fits: MachineFits, model: FittedModel, spline: FreeSpline, tested: tuple[float, float]
-) -> tuple[Tangent, float]:
-    """Quadratic log-likelihood of the spline's coefficients, and the variance that it is over.
+def information_of(
+    blocks: Blocks, model: FittedModel, columns: Sequence[Column], priors: Mapping[Column, NumberPrior]
+) -> tuple[Samples, Samples, float]:
+    """Information that blocks have of coefficients beside others of a model, (K, K), and their pull, (K,).
 
-    What is left scatters by blocks: a block counts as so many independent pieces.
+    Both over the variance, which is the third: what is left scatters by blocks, and a block counts as so many
+    independent pieces. What is at its bound stays there.
     """
-    fit = model.fit
-    count = len(spline.columns)
-    own = [place for place in range(len(fit.columns) - count) if not fit.at_bound[place]]
-    inside = blocks.places(spline.columns)
-    beside = blocks.places([fit.columns[place] for place in own])
-    total = blocks.products.sum(axis=0)
+    fit, total = model.fit, blocks.products.sum(axis=0)
+    others = [place for place, column in enumerate(fit.columns) if column not in set(columns)]
+    own = [place for place in others if not fit.at_bound[place]]
+    held = [place for place in others if fit.at_bound[place]]
+    inside = blocks.places(columns)
+    beside, at_bound = (blocks.places([fit.columns[place] for place in part]) for part in (own, held))
     variance = float(blocks.losses(fit.columns, fit.coefficients).sum()) / blocks.pieces
-    weight = prior_weight(blocks, fit.columns[:-count], fit.coefficients[:-count], fits.priors)
-    matrix = total[np.ix_(beside, beside)] + np.diag(weight[own])
-    held = [place for place in range(len(fit.columns) - count) if fit.at_bound[place]]
-    at_bound = blocks.places([fit.columns[place] for place in held])
+    beside_it = [fit.columns[place] for place in others]
+    weight = dict(zip(others, prior_weight(blocks, beside_it, fit.coefficients[others], priors), strict=True))
+    matrix = total[np.ix_(beside, beside)] + np.diag([weight[place] for place in own])
     target = total[:, -1] - total[:, at_bound] @ fit.coefficients[held]
     inverse = np.linalg.pinv(matrix, rcond=1e-12, hermitian=True)
     cross = total[np.ix_(inside, beside)]
     information = total[np.ix_(inside, inside)] - cross @ inverse @ cross.T
     pull = target[inside] - cross @ inverse @ target[beside]
+    return information / variance, pull / variance, variance
+
+
+def tangent_of(
+    blocks: Blocks, fits: MachineFits, model: FittedModel, spline: FreeSpline, tested: tuple[float, float]
+) -> tuple[Tangent, float]:
+    """Quadratic log-likelihood of the spline's coefficients, and the variance that it is over."""
+    information, pull, variance = information_of(blocks, model, spline.columns, fits.priors)
+    count = len(spline.columns)
     quadratic = Tangent(
-        information / variance,
-        pull / variance,
+        information,
+        pull,
         *tested,
         samples=int(blocks.pieces),
         constant=False,
-        fitted=fit.coefficients[-count:],
+        fitted=model.fit.coefficients[-count:],
         others=np.zeros(0),
         response=np.zeros((0, count)),
     )

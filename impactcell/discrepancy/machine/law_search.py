@@ -7,11 +7,9 @@ themselves. Held-out blocks and the held-out simulation decide; where they do no
 tried, and the error of the test is shared among all that may be.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from impactcell.discrepancy.laws import RankedForm, rank_forms
-from impactcell.discrepancy.machine.base_model import LawForm, TermChoice
+from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, MachineLaw
 from impactcell.discrepancy.machine.free_splines import (
     FreeSpline,
@@ -22,6 +20,7 @@ from impactcell.discrepancy.machine.free_splines import (
 )
 from impactcell.discrepancy.machine.held_number import HeldNumber
 from impactcell.discrepancy.machine.held_numbers import NEARLY_ALL, does_as_well, fitted, numbers_held
+from impactcell.discrepancy.machine.law_forms import Forms, nearest_forms
 from impactcell.discrepancy.machine.law_proof import proved_form
 from impactcell.discrepancy.machine.law_refusal import (
     GIVES_ENERGY,
@@ -30,7 +29,7 @@ from impactcell.discrepancy.machine.law_refusal import (
     listed_instead,
     refusal_of,
 )
-from impactcell.discrepancy.machine.law_terms import LAW_PREFIX, term_of
+from impactcell.discrepancy.machine.law_terms import LAW_PREFIX
 from impactcell.discrepancy.machine.look_alikes import one_way_note
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.needs import MIN_NEED, needs_of_free_forms
@@ -39,24 +38,19 @@ from impactcell.discrepancy.machine.regression import Blocks, fit_blocks, out_of
 from impactcell.discrepancy.machine.rival_forms import (
     COVARIATES,
     FREE_FORMS,
-    SPLINE_PIECES,
     columns_of_splines,
 )
 from impactcell.discrepancy.machine.selection import MIN_GAIN_Z, MIN_SHARE_OF_FREE
 from impactcell.discrepancy.machine.simulation import simulate_held_out
+from impactcell.discrepancy.machine.smooth_law import as_law, smooth_law
 from impactcell.discrepancy.machine.ties import TIE_Z
-from impactcell.discrepancy.machine.trials import ChosenTerm, mean_over_error
-from impactcell.discrepancy.machine.weak_form import Column
+from impactcell.discrepancy.machine.trials import mean_over_error
 from impactcell.discrepancy.search import MAX_EXPECTED_GAP
 from impactcell.physics.effect_names import in_words
 from impactcell.records import Samples
 
 MIN_SHARE = 0.05
 """Share of the squared residual above the noise that a spline has to close: less is not worth a law [1]."""
-REFITTED = 20
-"""Functional forms that are fitted by themselves, of those that come nearest to the spline."""
-PIECES_PER_WAVE = 3.0
-"""Pieces of a spline that a wave takes to be seen in it."""
 MOST_FREED = 3
 """Numbers that the base model holds, and beside which a law is looked for."""
 BY_LOAD = TermChoice("load_dependent_friction")
@@ -84,7 +78,7 @@ def with_law(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
         return replace(finding, law_refused=outcome)
     if isinstance(outcome, MachineLaw):
         notes = (*finding.notes, *(number.beside_a_law for number in freed))
-        if COVARIATES[outcome.place.removeprefix(LAW_PREFIX)] == "position":
+        if "position" in outcome.tested:
             notes = (*notes, *one_way_note(finding.records))
         law = replace(outcome, beside=tuple(number.phrase for number in freed))
         return replace(finding, law=law, notes=notes)
@@ -110,11 +104,11 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNu
     )
     looked_at = _LookedAt(fits, finding, own, training, held_out, model, before, tuple(tried))
     excess = float(before.sum() - training.noise.sum())
-    holding = [spline for spline in tried if _holds(spline, MIN_SHARE * excess)]
+    holding = [spline for spline in tried if _holds(spline.gains, MIN_SHARE * excess)]
     if not holding:
-        return NOTHING_HELPS
+        return looked_at.smooth_law(MIN_SHARE * excess) or NOTHING_HELPS
     numbers = looked_at.numbers(NEARLY_ALL * excess)
-    as_well = [[one for one, gains in numbers if _stands_for(one, gains, spline)] for spline in holding]
+    as_well = [[one for one, gains in numbers if _stands_for(one, gains, spline.gains)] for spline in holding]
     if as_well[0]:
         return as_well[0][0]
     needs = needs_of_free_forms(fits.smooth_force(own).beside(columns))
@@ -132,18 +126,20 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNu
         refused = refused or fault
         if fault == GIVES_ENERGY:  # held-out blocks want it all the same: it stands for something else
             break
+    if refused == NOT_IN_ONE_PLACE:
+        return looked_at.smooth_law(MIN_SHARE * excess) or refused
     return refused
 
 
-def _holds(spline: FreeSpline, least: float) -> bool:
-    """Whether a spline helps block after block."""
-    return mean_over_error(spline.gains) >= MIN_GAIN_Z and float(spline.gains.sum()) >= least
+def _holds(gains: Samples, least: float) -> bool:
+    """Whether a function helps block after block."""
+    return mean_over_error(gains) >= MIN_GAIN_Z and float(gains.sum()) >= least
 
 
-def _stands_for(number: HeldNumber, gains: Samples, spline: FreeSpline) -> bool:
-    """Whether a number does as well as a spline, or leaves so little of it that a law begins beside it."""
-    nearly_all = float(gains.sum()) >= NEARLY_ALL * float(spline.gains.sum())
-    return does_as_well(gains, spline.gains, MIN_SHARE_OF_FREE) or (nearly_all and not number.is_delay)
+def _stands_for(number: HeldNumber, gains: Samples, of_function: Samples) -> bool:
+    """Whether a number does as well as a function, or leaves so little of it that a law begins beside it."""
+    nearly_all = float(gains.sum()) >= NEARLY_ALL * float(of_function.sum())
+    return does_as_well(gains, of_function, MIN_SHARE_OF_FREE) or (nearly_all and not number.is_delay)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -190,6 +186,19 @@ class _LookedAt:
                 found.append((number, gains))
         return sorted(found, key=lambda one: -float(one[1].sum()))
 
+    def smooth_law(self, least: float) -> MachineLaw | HeldNumber | str:
+        """Smooth force of velocity and position, if records confirm it, or what does as well; else empty."""
+        fits, columns = self.fits, list(self.model.fit.columns)
+        smooth = smooth_law(fits, self.own, columns, self.before)
+        if not _holds(smooth.gains, least):
+            return ""
+        for number, gains in self.numbers(NEARLY_ALL * float(smooth.gains.sum())):
+            if _stands_for(number, gains, smooth.gains):
+                return number
+        law = as_law(fits, self.finding, self.model, smooth)
+        fault = refusal_of(self.finding, law, len(self.splines) + 1)
+        return law if not fault else fault if fault == GIVES_ENERGY else ""
+
     def law_in(self, spline: FreeSpline, tests: int) -> MachineLaw:
         """Condense a spline to a law, and hold it to what it was not fitted to; one of so many `tests`."""
         fits, finding, model = self.fits, self.finding, self.model
@@ -201,9 +210,8 @@ class _LookedAt:
         tested = finding.scale.ranges[COVARIATES[spline.form]]
         smooth = with_spline(fits, self.training, model, spline)
         tangent, variance = tangent_of(self.training, fits, smooth, spline, tested)
-        ranked = [item for item in rank_forms(tangent) if _is_resolved(item, tested)]
-        choices = _choices(spline.form, ranked[:REFITTED], max(map(abs, tested)))
-        laws = _Forms(fits, (*self.own, *choices), model, choices)
+        choices = nearest_forms(spline.form, tangent, tested)
+        laws = Forms(fits, (*self.own, *choices), model, choices)
         chosen, equivalents = laws.condensed(spline.gains, self.before)
         if chosen is None:
             law_model, fall = smooth, fall_of_gap(self.held_out, model, smooth, finding.seed)
@@ -220,7 +228,16 @@ class _LookedAt:
             simulated = nearest, simulate_held_out(finding, law_model)
         place = LAW_PREFIX + spline.form
         return MachineLaw(
-            place, tested, curve, chosen, equivalents, rivals, model, law_model, fall, simulated
+            place,
+            {COVARIATES[spline.form]: tested},
+            curve,
+            chosen,
+            equivalents,
+            rivals,
+            model,
+            law_model,
+            fall,
+            simulated,
         )
 
 
@@ -231,69 +248,3 @@ def _gone_through(fits: MachineFits, finding: MachineFinding) -> list[str]:
     looked_at = {trial.term.choice for step in finding.steps for trial in step.trials}
     is_drive = BY_LOAD in fits.candidates and BY_LOAD not in looked_at
     return [form for form in forms if not (is_drive and COVARIATES[form] == "load")]
-
-
-def _is_resolved(form: RankedForm, tested: tuple[float, float]) -> bool:
-    """Whether a spline could have shown every wave of a form."""
-    shortest = PIECES_PER_WAVE * (tested[1] - tested[0]) / SPLINE_PIECES
-    return all(
-        value >= shortest
-        for item in form.terms
-        for atom, values in zip(item.term, item.shapes, strict=True)
-        for shape, value in zip(atom.shapes, values, strict=True)
-        if shape.name == "period"
-    )
-
-
-def _choices(form: str, ranked: Sequence[RankedForm], reference: float) -> tuple[TermChoice, ...]:
-    """Name the forms; of two with one name the first."""
-    choices: dict[str, TermChoice] = {}
-    for item in ranked:
-        choice = TermChoice(LAW_PREFIX + form, law=LawForm(item.terms, reference))
-        choices.setdefault(choice.name, choice)
-    return tuple(choices.values())
-
-
-class _Forms:
-    """Functional forms in one place, fitted by themselves beside a model."""
-
-    def __init__(
-        self,
-        fits: MachineFits,
-        choices: Sequence[TermChoice],
-        model: FittedModel,
-        forms: Sequence[TermChoice],
-    ) -> None:
-        self.fits, self.model, self.forms = fits, model, forms
-        self.training, _ = fits.blocks(fits.rows_with(choices, columns_of_splines))
-
-    def _fit_columns(self, form: TermChoice) -> list[Column]:
-        return [*self.model.fit.columns, *ChosenTerm(form, 0.0).columns]
-
-    def condensed(self, spline: Samples, before: Samples) -> tuple[TermChoice | None, tuple[str, ...]]:
-        """Shortest form that does as well out of fold as the spline, and those that do as well as it."""
-        gains = {
-            form: before - out_of_fold_losses(
-                self.training, self._fit_columns(form), self.fits.priors, self.fits.nonnegative
-            )
-            for form in self.forms
-        }  # fmt: skip
-        best = max(gains.values(), key=lambda gain: float(gain.sum()))
-        if float(best.sum()) < MIN_SHARE_OF_FREE * float(spline.sum()):
-            return None, ()
-        alike = [
-            form
-            for form, gain in gains.items()
-            if float(gain.sum()) >= MIN_SHARE_OF_FREE * float(best.sum())
-            and mean_over_error(best - gain) < TIE_Z
-        ]
-        shortest = min(alike, key=lambda form: (_numbers(form), -float(gains[form].sum())))
-        return shortest, tuple(form.law.name for form in alike if form is not shortest and form.law)
-
-
-def _numbers(choice: TermChoice) -> int:
-    """How many numbers a form has, a wave's period once."""
-    if choice.law is None:
-        return 0
-    shapes = {value for item in choice.law.terms for atom in item.shapes for value in atom}
-    return len(term_of(choice).strengths) + len(shapes)

@@ -5,16 +5,24 @@ from functools import lru_cache
 
 import numpy as np
 
-from impactcell.discrepancy.machine.base_model import LawForm, TermChoice
-from impactcell.discrepancy.machine.rival_forms import COVARIATES, FREE_FORMS, VALUES
+from impactcell.discrepancy.machine.base_model import LawForm, Reach, TermChoice
+from impactcell.discrepancy.machine.rival_forms import (
+    COVARIATES,
+    EQUATIONS,
+    FREE_FORMS,
+    SMOOTH_FORM,
+    VALUES,
+)
+from impactcell.discrepancy.machine.smooth_waves import WAVES, waves_at
 from impactcell.discrepancy.machine.terms import CATALOGUE, MotionState, Term
 from impactcell.records import Samples
 
 LAW_PREFIX = "law_of_"
 """How the identifier of a law's place begins: `law_of_friction_over_speed`."""
 LAW_PLACES = {f"{LAW_PREFIX}{form}": form for form in FREE_FORMS}
-"""Places where a law may act, by their identifiers, and the free form that stands there."""
-
+"""Places where a law of one covariate may act, by their identifiers, and the free form that stands there."""
+SMOOTH_LAW = LAW_PREFIX + SMOOTH_FORM
+"""Identifier of a smooth force of velocity and position."""
 
 TERMS_OF_FORMS: Mapping[tuple[str, str], str] = {
     ("friction_over_speed", "1"): "coulomb_friction",
@@ -27,6 +35,11 @@ TERMS_OF_FORMS: Mapping[tuple[str, str], str] = {
     ("force_over_speed", "u"): "directional_viscous_friction",
 }
 """Terms of the catalogue by the place and the form of a law that is one of them."""
+
+
+def law_place(identifier: str) -> str:
+    """Say how a law in a place enters the equation of motion."""
+    return EQUATIONS[identifier.removeprefix(LAW_PREFIX)]
 
 
 def listed_term(choice: TermChoice, amplitudes: Sequence[float]) -> str:
@@ -46,6 +59,8 @@ def term_of(choice: TermChoice) -> Term:
     KeyError
         The catalogue has no such term, and it is no law.
     """
+    if choice.reach is not None:
+        return _smooth_term(choice.identifier, choice.reach)
     if choice.law is None:
         return CATALOGUE[choice.identifier]
     return _law_term(choice.identifier, choice.law)
@@ -70,4 +85,15 @@ def _law_term(identifier: str, law: LawForm) -> Term:
         tuple((name, "{F}") for name in names),
         features,
         is_friction=form.startswith("friction"),
+    )
+
+
+@lru_cache(maxsize=16)
+def _smooth_term(identifier: str, reach: Reach) -> Term:
+    return Term(
+        identifier,
+        EQUATIONS[SMOOTH_FORM],
+        "found in the records",
+        tuple((f"wave_{number}", "{F}") for number in range(1, WAVES**2 + 1)),
+        lambda motion, _: waves_at(motion.position, motion.velocity, reach),
     )

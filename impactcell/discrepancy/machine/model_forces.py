@@ -76,7 +76,8 @@ def motions(finding: MachineFinding) -> list[MotionState]:
 def resistance(finding: MachineFinding, model: FittedModel) -> tuple[float, float]:
     """Least and largest force against the motion over all records, by the terms that may not give energy.
 
-    Terms of friction count, and those whose strength may not be negative; springs and waves of force do not.
+    Terms of friction count, those whose strength may not be negative, and of a smooth force what turns with
+    the motion; springs and waves of force do not.
     """
     least, largest = math.inf, 0.0
     for record, motion in zip(finding.records, motions(finding), strict=True):
@@ -88,7 +89,10 @@ def resistance(finding: MachineFinding, model: FittedModel) -> tuple[float, floa
             term = term_of(chosen.choice)
             column = np.full(moving.shape, record.covariates.get(chosen.choice.covariate, 0.0))
             features = term.features(replace(motion, covariate=column), chosen.shape)
-            if term.is_friction or term.nonnegative:
+            if chosen.choice.reach is not None:  # what turns with the motion takes energy, or gives it
+                other_way = replace(motion, velocity=-motion.velocity, covariate=column)
+                features = 0.5 * (features - term.features(other_way, chosen.shape))
+            if term.is_friction or term.nonnegative or chosen.choice.reach is not None:
                 sense = 1.0 if term.is_friction else -np.sign(motion.velocity)
                 against += sense * sum(
                     model.value(name) * feature

@@ -10,19 +10,16 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from impactcell.discrepancy.machine.base_model import NumberPrior
+from impactcell.discrepancy.machine.base_model import NumberPrior, Reach
 from impactcell.discrepancy.machine.regression import RIDGE
 from impactcell.discrepancy.machine.rival_forms import Ranges, columns_of_corners
+from impactcell.discrepancy.machine.smooth_waves import spectrum, waves_at
 from impactcell.discrepancy.machine.terms import MotionState
 from impactcell.discrepancy.machine.weak_form import Column, IndexArray, Rows
 from impactcell.records import Samples
 
 NAME = "smooth_force"
 """Name of its columns."""
-WAVES = 8
-"""Waves along position, and as many along velocity [1]."""
-BOX = 1.5
-"""Half width of what they are waves in, over half the range that was gone through [1]."""
 LENGTHS = (0.4, 0.8)
 """Correlation lengths that are tried, over half the range that was gone through [1]."""
 LEVELS = np.geomspace(1e-3, 1e3, 25)
@@ -39,38 +36,15 @@ the model leaves; -inf where a strength would be negative that may not be.
 
 
 def smooth_force_columns(motion: MotionState, direction: Samples, ranges: Ranges) -> dict[Column, Samples]:
-    """Waves that a smooth force is made of, beside the free forms of `columns_of_corners`; shape (n,) each.
-
-    sin(i pi (x + L) / (2 L)) sin(j pi (u + L) / (2 L)) / L, x of position and u of velocity over half their
-    ranges, L = `BOX` (Solin and Särkkä 2020, doi:10.1007/s11222-019-09886-w, eq. 32).
-    """
-    low, high = ranges["position"]
-    middle, half = 0.5 * (low + high), max(0.5 * (high - low), np.finfo(float).tiny)
-    along = _waves((motion.position - middle) / half)
-    over = _waves(motion.velocity / max(ranges["speed"][1], np.finfo(float).tiny))
+    """Waves that a smooth force is made of beside the free forms of `columns_of_corners`, shape (n,) each."""
     columns = columns_of_corners(motion, direction, ranges)
-    for i, one in enumerate(along):
-        for j, two in enumerate(over):
-            columns[NAME, 0.0, i * WAVES + j] = one * two
-    return columns
+    waves = waves_at(motion.position, motion.velocity, reach_of(ranges))
+    return columns | {(NAME, 0.0, number): wave for number, wave in enumerate(waves)}
 
 
-def _waves(values: Samples) -> Samples:
-    """Waves in the box, shape (WAVES, n)."""
-    number = np.arange(1, WAVES + 1)[:, None]
-    waves: Samples = np.sin(number * np.pi * (values + BOX) / (2.0 * BOX)) / math.sqrt(BOX)
-    return waves
-
-
-def _spectrum(length: float) -> Samples:
-    """Variances of the waves of a force of one correlation length, in the order of its columns.
-
-    2 pi l² exp(-l² |w|² / 2), w the angular frequencies of a wave (ibid., eq. 3).
-    """
-    frequency = np.arange(1, WAVES + 1) * np.pi / (2.0 * BOX)
-    square = np.add.outer(frequency**2, frequency**2).ravel()
-    spectrum: Samples = 2.0 * np.pi * length**2 * np.exp(-0.5 * length**2 * square)
-    return spectrum
+def reach_of(ranges: Ranges) -> Reach:
+    """Positions and speeds that were gone through."""
+    return Reach(ranges["position"], ranges["speed"][1])
 
 
 class SmoothForce:
@@ -114,7 +88,7 @@ class SmoothForce:
         self._priors = priors
         self._nonnegative = nonnegative
         shapes = np.stack([rows.columns[name][chosen] for name in waves], axis=1) / sigma[:, None]
-        self._forces = [self._force(shapes * np.sqrt(_spectrum(length)), stacked) for length in LENGTHS]
+        self._forces = [self._force(shapes * np.sqrt(spectrum(length)), stacked) for length in LENGTHS]
 
     def beside(self, columns: Sequence[Column]) -> Need:
         """Put a model, by its columns, beside the force."""

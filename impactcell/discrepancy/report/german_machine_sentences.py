@@ -110,9 +110,12 @@ def headline(finding: MachineFinding) -> str:
                 f"{law.fall.after:.2f}; benannt ist es nicht, denn: {why}."
             )
         else:
-            said += (
-                f" {says}, bringt die Abweichung auf {law.fall.after:.2f}: ein Gesetz, das keine Liste hatte."
+            kind = (
+                "eine glatte Kraft, bekannt als Tabelle"
+                if law.slices
+                else "ein Gesetz, das keine Liste hatte"
             )
+            said += f" {says}, bringt die Abweichung auf {law.fall.after:.2f}: {kind}."
     errors, better = finding.simulated, finding.better_simulated
     if better is not None:
         rmse, names = (errors[-1].rmse, better.rmse), enumerated_names([*map(phrase, better.names)], "oder")

@@ -49,6 +49,7 @@ _LABELS: Final = {
     "spline": "Spline",
     "spline, 95 % band": "Spline, 95-%-Band",
     "s(u) less its mean": "s(u) ohne seinen Mittelwert",
+    "s(u, w) less its mean": "s(u, w) ohne seinen Mittelwert",
     "95 % bands": "95-%-Bänder",
     "below: where samples lie": "unten: wo Messwerte liegen",
     "nominal plant": "Ausgangsmodell",

@@ -1,12 +1,13 @@
 """Pictures of a law that nobody had listed: the free-form term with its band, and the law beside it."""
 
+from collections.abc import Sequence
 from types import ModuleType
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from impactcell.discrepancy.laws import FittedFunction, LawFinding
+from impactcell.discrepancy.laws import FittedFunction
 from impactcell.discrepancy.report.figures import AFTER, BEFORE, MEASURED, STYLE, svg
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.physics.free_column_forms import printed
@@ -20,7 +21,20 @@ def law_figure(result: DiscrepancyResult, said: ModuleType) -> str | None:
         return None
     form, law = finding.term.form, finding.proposed
     if finding.slices:
-        return _slices_figure(finding, said)
+        laws = [
+            law.values(np.column_stack([curve.covariate, np.full(curve.covariate.size, w)]))
+            for w, curve in finding.slices
+            if law is not None
+        ]
+        return slices_figure(
+            finding.slices,
+            (laws, "" if law is None else law.functional_form),
+            (form.covariate, form.covariate_unit),
+            (printed(form.second), form.second_unit),
+            form.unit,
+            less_mean=False,
+            said=said,
+        )
     return function_figure(
         finding.function,
         None if law is None else (law.values(finding.function.covariate), law.functional_form),
@@ -31,25 +45,54 @@ def law_figure(result: DiscrepancyResult, said: ModuleType) -> str | None:
     )
 
 
-def _slices_figure(finding: LawFinding, said: ModuleType) -> str:
-    """Draw a term of two covariates along the first at values of the second, with its bands and the law."""
-    form, law = finding.term.form, finding.proposed
-    scale, unit = (1e3, "mm") if form.covariate_unit == "m" else (1.0, form.covariate_unit)
-    second = said.phrase(printed(form.second))
+def slices_figure(
+    slices: Sequence[tuple[float, FittedFunction]],
+    laws_and_name: tuple[Sequence[Samples], str],
+    first_and_unit: tuple[str, str],
+    second_and_unit: tuple[str, str],
+    function_unit: str,
+    *,
+    less_mean: bool,
+    said: ModuleType,
+) -> str:
+    """Draw a function of two covariates along the first at three values of the second, with its bands.
+
+    Parameters
+    ----------
+    slices : sequence of (float, FittedFunction)
+        Values of the second covariate, and the function there.
+    laws_and_name : (sequence of ndarray, str)
+        Values of a law where the slices have them, and its name; none without one.
+    first_and_unit, second_and_unit : (str, str)
+    function_unit : str
+    less_mean : bool
+        The model takes a constant up, so that it is no difference.
+    said : module
+        `sentences`, or the one of another language.
+    """
+    (covariate, covariate_unit), (second, second_unit) = first_and_unit, second_and_unit
+    scale, unit = (1e3, "mm") if covariate_unit == "m" else (1.0, covariate_unit)
+    of_second, unit_of_second = (1e3, "mm") if second_unit == "m" else (1.0, second_unit.strip("1"))
+    level = float(np.mean([curve.function for _, curve in slices])) if less_mean else 0.0
+    laws, name = laws_and_name
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 3.4))
         axes = figure.subplots()
         axes.axhline(0.0, color="#8a97a3", linewidth=0.8)
-        for (w, curve), style in zip(finding.slices, ("-", "--", ":"), strict=True):
+        for number, ((w, curve), style) in enumerate(zip(slices, ("-", "--", ":"), strict=True)):
             u = scale * curve.covariate
-            at = said.written(f"w = {w:.3g} {form.second_unit.strip('1')}")
-            axes.fill_between(u, curve.low, curve.high, color=MEASURED, alpha=0.4, linewidth=0)
-            axes.plot(u, curve.function, style, color=BEFORE, label=f"{said.label('spline')}, {at}")
-            if law is not None:
-                values = law.values(np.column_stack([curve.covariate, np.full(len(u), w)]))
-                axes.plot(u, values, style, color=AFTER, label=f"{law.functional_form}, {at}")
-        axes.set_ylabel("s(u, w)" if form.unit == "1" else f"s(u, w) [{form.unit}]")
-        axes.set_xlabel(f"u, {said.phrase(form.covariate)} [{unit}]; w, {second}; {said.label('95 % bands')}")
+            at = said.written(f"w = {of_second * w:.3g} {unit_of_second}".rstrip())
+            axes.fill_between(
+                u, curve.low - level, curve.high - level, color=MEASURED, alpha=0.4, linewidth=0
+            )
+            axes.plot(u, curve.function - level, style, color=BEFORE, label=f"{said.label('spline')}, {at}")
+            if laws:
+                axes.plot(u, laws[number], style, color=AFTER, label=f"{name}, {at}")
+        what = said.label("s(u, w) less its mean") if less_mean else "s(u, w)"
+        axes.set_ylabel(what if function_unit == "1" else f"{what} [{function_unit}]")
+        axes.set_xlabel(
+            f"u, {said.phrase(covariate)} [{unit}]; w, {said.phrase(second)}; {said.label('95 % bands')}"
+        )
         axes.legend(frameon=False, fontsize=8)
         return svg(figure, said)
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from impactcell.discrepancy.machine import CATALOGUE, MIN_NEED, VALUES, ChosenTerm, MachineFinding, motions
 from impactcell.discrepancy.report import german_machine_sentences, machine_sentences
-from impactcell.discrepancy.report.law_figures import function_figure
-from impactcell.discrepancy.report.machine_parameters import SYMBOLS, law_covariate, parameter_rows
+from impactcell.discrepancy.report.law_figures import function_figure, slices_figure
+from impactcell.discrepancy.report.machine_parameters import SYMBOLS, law_covariates, parameter_rows
 from impactcell.discrepancy.report.page import report_environment
 from impactcell.german.findings import REPORTS
 
@@ -19,6 +19,8 @@ SHOWN_FORMS = 5
 """Forms alike that the page lists [1]."""
 SHOWN_TRIALS = 15
 """Terms that the page lists [1]."""
+SHOWN_PLACES = (0.1, 0.5, 0.9)
+"""Where a force of velocity and position is shown, in shares of the range of positions [1]."""
 WHOLE = 100.0
 """Logarithms from which on no decimal says anything [1]."""
 PREFIXES = ("", "m", "µ", "n")
@@ -134,8 +136,13 @@ def _law_figure(finding: MachineFinding, said: ModuleType) -> str:
     law = finding.law
     if law is None:
         return ""
-    covariate, unit = law_covariate(finding)
-    force = SYMBOLS[finding.base.coordinate]["force"]
+    units, force = law_covariates(finding), SYMBOLS[finding.base.coordinate]["force"]
+    if law.slices:
+        shown = [law.slices[int(share * (len(law.slices) - 1))] for share in SHOWN_PLACES]
+        first, second = units.items()
+        return slices_figure(shown, ((), ""), first, second, force, less_mean=True, said=said)
+    ((covariate, unit),) = units.items()
+    low, high = law.tested[covariate]
     values = None
     if law.choice is not None and law.choice.law is not None:
         chosen = ChosenTerm(law.choice, 0.0)
@@ -149,7 +156,7 @@ def _law_figure(finding: MachineFinding, said: ModuleType) -> str:
     return function_figure(
         law.spline,
         None if values is None else (np.asarray(values), name),
-        met[(met >= law.tested[0]) & (met <= law.tested[1])],
+        met[(met >= low) & (met <= high)],
         (covariate, unit, force),
         less_mean=True,
         said=said,

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 from impactcell.campaign import Coordinate
-from impactcell.discrepancy.machine import COVARIATES, LAW_PLACES, MachineFinding
+from impactcell.discrepancy.machine import MachineFinding
 from impactcell.german.parameters import without_unit, words_of
 
 SYMBOLS: Final = {
@@ -39,12 +39,11 @@ def parameter_name(name: str, unit: str, coordinate: Coordinate) -> str:
     return f"{name}_{slug}" if slug else name
 
 
-def law_covariate(finding: MachineFinding) -> tuple[str, str]:
-    """Name what a proposed law is a function of, and its unit."""
-    symbols = SYMBOLS[finding.base.coordinate]
-    covariate = "" if finding.law is None else COVARIATES[LAW_PLACES[finding.law.place]]
-    units = {"speed": f"{symbols['q']}/s", "load": symbols["force"], "position": symbols["q"]}
-    return covariate, units.get(covariate, "1")
+def law_covariates(finding: MachineFinding) -> dict[str, str]:
+    """Name what a proposed law is a function of, with units; nothing where none is proposed."""
+    q, force = SYMBOLS[finding.base.coordinate]["q"], SYMBOLS[finding.base.coordinate]["force"]
+    units = {"speed": f"{q}/s", "velocity": f"{q}/s", "load": force, "position": q}
+    return {} if finding.law is None else {name: units[name] for name in finding.law.tested}
 
 
 def machine_parameter_words(name: str, coordinate: Coordinate, language: str) -> tuple[str, str]:

@@ -6,17 +6,16 @@ from typing import Any
 from impactcell.discrepancy.laws import shape_names
 from impactcell.discrepancy.machine import (
     ECCENTRICITY,
-    FREE_FORMS,
-    LAW_PLACES,
     ChosenTerm,
     FallOfGap,
     FittedModel,
     MachineFinding,
     OpenLoopError,
+    law_place,
     shape_grid,
     term_of,
 )
-from impactcell.discrepancy.report.machine_parameters import SYMBOLS, law_covariate, parameter_name
+from impactcell.discrepancy.report.machine_parameters import SYMBOLS, law_covariates, parameter_name
 from impactcell.discrepancy.report.machine_sentences import headline, law_equation
 from impactcell.discrepancy.report.result import FORMAT, SPLINE_ONLY, experiments, round_digits
 from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
@@ -124,26 +123,26 @@ def _law(finding: MachineFinding) -> dict[str, Any]:
     law = finding.law
     if law is None:
         return {"law": None, "law_refused": finding.law_refused or None}
-    covariate, unit = law_covariate(finding)
+    units = law_covariates(finding)
     chosen = None if law.choice is None else ChosenTerm(law.choice, 0.0)
     document = {
-        "place": FREE_FORMS[LAW_PLACES[law.place]],
-        "covariates": [covariate],
+        "place": law_place(law.place),
+        "covariates": [*units],
         "form": SPLINE_ONLY if law.choice is None or law.choice.law is None else law.choice.law.name,
         "equation": law_equation(finding, law),
         "term": law.listed or None,
         "parameters": {} if chosen is None else _law_parameters(finding, chosen),
         "equivalents": list(law.equivalents),
-        "rival_places": [FREE_FORMS[LAW_PLACES[place]] for place in law.rival_places],
+        "rival_places": [law_place(place) for place in law.rival_places],
         "beside": list(law.beside),
         "tested_range": {
-            covariate: {
-                "low": round_digits(law.tested[0]), "high": round_digits(law.tested[1]), "unit": unit
-            }
+            covariate: {"low": round_digits(low), "high": round_digits(high), "unit": units[covariate]}
+            for covariate, (low, high) in law.tested.items()
         },
         "held_out": {**_fall(law.fall), "p_value": round_digits(law.fall.p_value)},
         "simulation": None if law.simulated is None else _simulation(finding, law.simulated),
         "file": None if law.choice is None else f"{law.place}.yaml",
+        "table": f"{law.place}.csv" if law.choice is None else None,
     }  # fmt: skip
     return {"law": document, "law_refused": None}
 
@@ -153,7 +152,7 @@ def _law_parameters(finding: MachineFinding, chosen: ChosenTerm) -> dict[str, An
     assert finding.law is not None  # noqa: S101 - asked for a law alone
     assert chosen.choice.law is not None  # noqa: S101
     model, law = finding.law.model, chosen.choice.law
-    force, (_, of_covariate) = SYMBOLS[finding.base.coordinate]["force"], law_covariate(finding)
+    force, (of_covariate,) = SYMBOLS[finding.base.coordinate]["force"], law_covariates(finding).values()
     document: dict[str, Any] = {}
     for (name, unit), column in zip(term_of(chosen.choice).strengths, chosen.columns, strict=True):
         place = model.fit.columns.index(column)

@@ -1,8 +1,8 @@
 """What the report of a machine says beside its template."""
 
 from impactcell.campaign import COLUMNS
-from impactcell.discrepancy.machine import FREE_FORMS, LAW_PLACES, MachineFinding, MachineLaw, term_of
-from impactcell.discrepancy.report.machine_parameters import law_covariate
+from impactcell.discrepancy.machine import MachineFinding, MachineLaw, law_place, term_of
+from impactcell.discrepancy.report.machine_parameters import law_covariates
 from impactcell.discrepancy.report.sentences import equation, label, note, reason, setting, written
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import better_sentence, open_loop_sentence
@@ -37,7 +37,8 @@ def headline(finding: MachineFinding) -> str:
                 f"{law.fall.after:.2f}; it is not named, since {why_not_named(finding, law.listed)}."
             )
         else:
-            said += f" {says}, takes the held-out gap to {law.fall.after:.2f}: a law that nobody had listed."
+            kind = "a smooth force, known as a table" if law.slices else "a law that nobody had listed"
+            said += f" {says}, takes the held-out gap to {law.fall.after:.2f}: {kind}."
     errors, better = finding.simulated, finding.better_simulated
     if better is not None:
         rmse, names = (errors[-1].rmse, better.rmse), enumerated([*map(phrase, better.names)], "or")
@@ -48,10 +49,12 @@ def headline(finding: MachineFinding) -> str:
 
 def law_equation(finding: MachineFinding, law: MachineLaw) -> str:
     """Equation of a law, with what its powers are over; of its place where only a spline does as well."""
-    place, choice = FREE_FORMS[LAW_PLACES[law.place]], law.choice
+    if law.slices:
+        return "s(u, w), u the {} and w the {}".format(*law.tested)
+    place, choice = law_place(law.place), law.choice
     if choice is None or choice.law is None:
         return place if choice is None else term_of(choice).equation
-    covariate, unit = law_covariate(finding)
+    ((covariate, unit),) = law_covariates(finding).items()
     return f"{place} with s(u) = {choice.law.printed(unit)}, u the {covariate}"
 
 

@@ -1,0 +1,144 @@
+"""A smooth force of velocity and position that remains, where no function in one place will do.
+
+Waves whose sizes go by one level and one correlation length, as blocks that they were not fitted to want
+them. It is known as a map, with its band, and has no form.
+"""
+
+import itertools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from impactcell.discrepancy.laws import BAND, DRAWN, FittedFunction
+from impactcell.discrepancy.machine.base_model import NumberPrior, TermChoice
+from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, MachineLaw
+from impactcell.discrepancy.machine.free_splines import information_of
+from impactcell.discrepancy.machine.law_terms import SMOOTH_LAW
+from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.proof import fall_of_gap
+from impactcell.discrepancy.machine.regression import Blocks, fit_blocks, out_of_fold_losses
+from impactcell.discrepancy.machine.rival_forms import Ranges
+from impactcell.discrepancy.machine.simulation import simulate_held_out
+from impactcell.discrepancy.machine.smooth_force import reach_of
+from impactcell.discrepancy.machine.smooth_waves import spectrum, waves_at
+from impactcell.discrepancy.machine.trials import ChosenTerm
+from impactcell.discrepancy.machine.weak_form import Column
+from impactcell.records import Samples
+
+LENGTHS = (0.2, 0.4, 0.8, 1.6)
+"""Correlation lengths that are tried, over half the range that was gone through [1]."""
+LEVELS = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
+"""Its standard deviations that are tried, over that of what remains [1]."""
+PLACES = 21
+"""Places, evenly over the range of positions, at which the force is told over the velocity [1]."""
+
+Priors = Mapping[Column, NumberPrior]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SmoothLaw:
+    """A smooth force beside a model.
+
+    Attributes
+    ----------
+    choice : TermChoice
+    training, held_out : Blocks
+        With its columns.
+    priors : mapping
+        Of nuisances and of its waves.
+    gains : ndarray, shape (b,)
+        Fall of each training block's squared residual out of fold.
+    """
+
+    choice: TermChoice
+    training: Blocks
+    held_out: Blocks
+    priors: Priors
+    gains: Samples
+
+
+def smooth_law(
+    fits: MachineFits, own: tuple[TermChoice, ...], columns: list[Column], before: Samples
+) -> SmoothLaw:
+    """Smooth force beside a model as blocks that it was not fitted to want it.
+
+    Parameters
+    ----------
+    own : tuple of TermChoice
+        Terms of the model beyond those of the base model.
+    columns : list of Column
+        Of the model.
+    before : ndarray, shape (b,)
+        Squared residual of each training block out of fold, without the force.
+    """
+    choice = TermChoice(SMOOTH_LAW, reach=reach_of(fits.scale.ranges))
+    waves = ChosenTerm(choice, 0.0).columns
+    training, held_out = fits.blocks(fits.rows_with((*own, choice), lambda *_: {}))
+    squares = np.diag(training.products.sum(axis=0))[training.places(waves)]
+    trials = []
+    for length, level in itertools.product(LENGTHS, LEVELS):
+        variances = spectrum(length)
+        unit = math.sqrt(float(before.sum()) / max(float(squares @ variances), np.finfo(float).tiny))
+        stds = level * unit * np.sqrt(variances)
+        priors = {
+            **fits.priors,
+            **{wave: NumberPrior(0.0, std) for wave, std in zip(waves, stds, strict=True)},
+        }
+        losses = out_of_fold_losses(training, [*columns, *waves], priors, fits.nonnegative)
+        trials.append(SmoothLaw(choice, training, held_out, priors, before - losses))
+    return max(trials, key=lambda trial: float(trial.gains.sum()))
+
+
+def as_law(fits: MachineFits, finding: MachineFinding, model: FittedModel, smooth: SmoothLaw) -> MachineLaw:
+    """Fit a smooth force beside a model, and hold it to what it was not fitted to."""
+    chosen = ChosenTerm(smooth.choice, 0.0)
+    columns = list(model.fit.columns)
+    without = replace(model, fit=fit_blocks(smooth.training, columns, fits.priors, fits.nonnegative))
+    fit = fit_blocks(smooth.training, [*columns, *chosen.columns], smooth.priors, fits.nonnegative)
+    with_it = replace(model, terms=(*model.terms, chosen), fit=fit)
+    ranges = fits.scale.ranges
+    speed = ranges["speed"][1]
+    slices = _slices(smooth, with_it, ranges)
+    simulated = [simulate_held_out(finding, without)]
+    if model.base is not finding.base:
+        simulated.append(finding.simulated[-1])
+    return MachineLaw(
+        SMOOTH_LAW,
+        {"velocity": (-speed, speed), "position": ranges["position"]},
+        slices[len(slices) // 2][1],
+        None,
+        (),
+        (),
+        without,
+        with_it,
+        fall_of_gap(smooth.held_out, without, with_it, finding.seed),
+        (min(simulated, key=lambda error: error.rmse), simulate_held_out(finding, with_it)),
+        slices=slices,
+    )
+
+
+def _slices(
+    smooth: SmoothLaw, model: FittedModel, ranges: Ranges
+) -> tuple[tuple[float, FittedFunction], ...]:
+    """Force over the velocity from place to place, with the 95 % band of it less its mean over all.
+
+    The mean is what a constant force of the machine takes up.
+    """
+    waves = ChosenTerm(smooth.choice, 0.0).columns
+    reach = reach_of(ranges)
+    information, _, _ = information_of(smooth.training, model, waves, smooth.priors)
+    stds = np.array([smooth.priors[wave].std for wave in waves])
+    covariance = np.outer(stds, stds) * np.linalg.inv(np.outer(stds, stds) * information + np.eye(len(stds)))
+    low, high = ranges["position"]
+    velocity = np.linspace(-reach.speed, reach.speed, DRAWN)
+    places = np.linspace(low, high, PLACES)
+    basis = np.stack([waves_at(np.full(DRAWN, place), velocity, reach).T for place in places])
+    moving = basis - basis.mean(axis=(0, 1))
+    value = basis @ np.array([model.value(wave) for wave in waves])
+    std = np.sqrt(np.maximum(np.einsum("snk,kl,snl->sn", moving, covariance, moving), 0.0))
+    return tuple(
+        (float(place), FittedFunction(velocity, middle, middle - BAND * half, middle + BAND * half))
+        for place, middle, half in zip(places, value, std, strict=True)
+    )
