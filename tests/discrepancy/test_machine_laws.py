@@ -19,6 +19,7 @@ from impactcell.campaign import Campaign, Coordinate, Excitation, write
 from impactcell.cli.app import app
 from impactcell.discrepancy.laws import ATOMS, Shaped
 from impactcell.discrepancy.machine import (
+    COVARIATES,
     BaseModel,
     FallOfGap,
     MachineFinding,
@@ -230,7 +231,8 @@ def with_law_of(place: str, form: str, amplitude: float = 1.0) -> MachineFinding
     size = np.array([amplitude])
     fit = LinearFit(ChosenTerm(choice, 0.0).columns, size, size, size, np.array([False]))
     model = replace(finding.law.model, fit=fit)
-    law = replace(finding.law, place=f"law_of_{place}", choice=choice, model=model)
+    tested = {COVARIATES[place]: (0.0, 0.2)}
+    law = replace(finding.law, place=f"law_of_{place}", tested=tested, choice=choice, model=model)
     return replace(finding, law=law)
 
 

@@ -35,11 +35,6 @@ SMOOTH_FORM = "force_over_velocity_and_position"
 """A smooth force of both, where no function in one place will do."""
 EQUATIONS: Mapping[str, str] = {**FREE_FORMS, SMOOTH_FORM: "s(q', q)"}
 """Where each enters the equation of motion."""
-LAW_COVARIATES: Mapping[str, tuple[str, ...]] = {
-    **{form: (covariate,) for form, covariate in COVARIATES.items()},
-    SMOOTH_FORM: ("velocity", "position"),
-}
-"""What a law in each place is a function of."""
 PLACES: Mapping[str, str] = {
     "viscous_friction": "friction_over_speed",
     "quadratic_drag": "friction_over_speed",
