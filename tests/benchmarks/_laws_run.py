@@ -2,7 +2,8 @@
 
 `python -m tests.benchmarks._laws_run --turns 2 --budget 300` adds the campaigns that are not there yet,
 balanced over what is hidden, and stops after 300 s of processor time; `--only none` takes those with nothing
-hidden, any other name those with that effect, and `--from 50` begins with a later turn.
+hidden, any other name those with that effect, `--from 50` begins with a later turn, and `--alone` leaves the
+rivals out, which take most of the time.
 """
 
 import argparse
@@ -141,7 +142,7 @@ def job_of(item: Hidden, turn: int, number: int) -> Job:
     return Job(kind, effects, FIRST_SEED + 100 * turn + number, strength=STRENGTH, shots=SHOTS)
 
 
-def run(item: Hidden, job: Job) -> dict[str, Any]:
+def run(item: Hidden, job: Job, *, beside_rivals: bool = True) -> dict[str, Any]:
     """One row of the study."""
     data = campaign(job)
     library = [name for name in LIBRARY if name != item.effect]
@@ -166,7 +167,7 @@ def run(item: Hidden, job: Job) -> dict[str, Any]:
         else round(steps[names[law_step + 1]] - steps[names[law_step]], 2),
         "law": None,
     }
-    if item.place in COMPARED:
+    if beside_rivals and item.place in COMPARED:
         truth = None if item.truth is None else partial(item.truth, p=hidden(job)[item.effect])
         row["rivals"] = compare(item.place, truth, found)
     finding = found.law
@@ -253,6 +254,7 @@ def main() -> None:
     parser.add_argument("--budget", type=float, default=math.inf, help="processor time [s]")
     parser.add_argument("--only", default="", help="an effect, or none")
     parser.add_argument("--from", dest="first", type=int, default=0, help="first turn")
+    parser.add_argument("--alone", action="store_true", help="without the rivals")
     arguments = parser.parse_args()
     ROWS.parent.mkdir(exist_ok=True)
     known = {json.loads(line)["key"] for line in ROWS.read_text().splitlines()} if ROWS.exists() else set()
@@ -265,7 +267,8 @@ def main() -> None:
             if job.key in known or time.process_time() - begun > arguments.budget:
                 continue
             with ROWS.open("a") as rows:
-                rows.write(json.dumps(run(item, job)) + "\n")
+                row = run(item, job, beside_rivals=not arguments.alone)
+                rows.write(json.dumps(row) + "\n")
 
 
 if __name__ == "__main__":
