@@ -31,6 +31,7 @@ from impactcell.service.monitoring import CellHealth, Monitoring, waiting_cell
 from impactcell.service.operator_commands import OperatorCommands
 from impactcell.service.page_servers import served_pages
 from impactcell.settings import CellConfig
+from impactcell.settings.exposed_files import exposed_files
 from impactcell.web import CellNews, TourStop
 from impactcell.web.live_feed import LiveFeed
 
@@ -219,6 +220,7 @@ def run(cells: Sequence[CellConfig]) -> None:
     """
     log_lines.configure()
     on_compilation(lambda: log.info(COMPILING))
+    _warn_of_exposed_files(cells)
     sys.setswitchinterval(SWITCH_S)
     try:
         interrupted = asyncio.run(_until_signalled(Service(cells)))
@@ -226,6 +228,17 @@ def run(cells: Sequence[CellConfig]) -> None:
         gc.freeze()  # the interpreter's end would look through everything once more, for most of a second
     if interrupted:
         raise KeyboardInterrupt
+
+
+def _warn_of_exposed_files(cells: Sequence[CellConfig]) -> None:
+    """Log once of each file that grants access and is open to others; cells may share them."""
+    told = {
+        remark.message: cell.fault(remark.message, ".".join(remark.place))
+        for cell in reversed(cells)
+        for remark in exposed_files(cell.settings)
+    }
+    for warning in reversed(told.values()):
+        log.warning("%s", warning)
 
 
 async def _until_signalled(service: Service) -> bool:

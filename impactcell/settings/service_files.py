@@ -26,6 +26,7 @@ from impactcell.process.tls_pair import authority_fault, pair_fault
 from impactcell.scada.interface import default_application_uri
 from impactcell.scada.users import read_users
 from impactcell.settings.cells import CellConfig
+from impactcell.settings.exposed_files import exposed_files
 from impactcell.settings.module_section import TlsSection
 from impactcell.settings.remark import Remark
 
@@ -50,6 +51,7 @@ def of_service(cell: CellConfig) -> Iterator[Remark]:
         yield from _of_pair(("web",), settings.web.certificate, settings.web.key, ANOTHER_FOR_THE_PAGE)
     if settings.module.tls is not None:
         yield from of_module_tls(settings.module.tls)
+    yield from exposed_files(settings)
     if settings.journal is not None:
         yield from _of_journal(settings.journal.file, cell.name)
     else:

@@ -91,6 +91,7 @@ USERS = "users: [{name: eva, role: engineer, password: x}]"
     ],
 )
 def test_a_users_file_is_looked_into(tmp_path: Path, text: str, is_fault: bool | None, told: str) -> None:
+    (tmp_path / "users.yaml").touch(0o600)
     (tmp_path / "users.yaml").write_text(text, encoding="utf-8")
     found = [finding for finding in judged(tmp_path, {}, {}) if "users" in finding.message]
     assert [finding.is_fault for finding in found] == ([] if is_fault is None else [is_fault])
