@@ -293,4 +293,4 @@ class ModuleAcquisition:
         self._ready.clear()
         await self._client.close()
         reason = str(error) if str(error).startswith(self.cell) else f"{self.cell}: {error}"
-        self._account.disconnect(reason)
+        self._account.disconnect(reason, answered=not isinstance(error, LinkError))

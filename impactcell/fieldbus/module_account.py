@@ -55,9 +55,12 @@ class ModuleAccount:
             self._log.info("connected to %s", link)
             self._tell()
 
-    def disconnect(self, reason: str, level: int = logging.WARNING) -> None:
-        """Note why there is no connection; the log is told once of each kind of reason."""
-        if self._changes(connected=False, reason=reason):
+    def disconnect(self, reason: str, level: int = logging.WARNING, *, answered: bool = False) -> None:
+        """Note why there is no connection; the log is told once of each kind of reason.
+
+        `answered`: something answers, and not as the module does.
+        """
+        if self._changes(connected=False, reason=reason, answered=answered):
             kind = kind_of(reason)
             if kind not in self._logged:
                 self._logged.append(kind)
@@ -92,12 +95,12 @@ class ModuleAccount:
             said = fault.removeprefix(f"{self._cell}: cycle {cycle}").lstrip(": ")
             self._log.warning("%s", said, cycle=cycle)
 
-    def _changes(self, *, connected: bool, reason: str) -> bool:
+    def _changes(self, *, connected: bool, reason: str, answered: bool = False) -> bool:
         """Take the state of the link; says whether it is another kind of state than before."""
         before = self.status
         if (before.connected, kind_of(before.reason)) == (connected, kind_of(reason)):
             return False
-        self.status = replace(before, connected=connected, reason=reason)
+        self.status = replace(before, connected=connected, reason=reason, answered=answered)
         return True
 
     def _tell(self) -> None:

@@ -34,6 +34,8 @@ class ModuleStatus:
         Whether the right module answers.
     reason : str
         Why it does not.
+    answered : bool
+        Whether something answers in its place: another protocol, another module, or registers of another map.
     round_trip_s : float
         Of the last request; nan before the first.
     received, missed, unreadable : int
@@ -47,6 +49,7 @@ class ModuleStatus:
 
     connected: bool = False
     reason: str = NOT_CONNECTED_YET
+    answered: bool = False
     round_trip_s: float = float("nan")
     received: int = 0
     missed: int = 0

@@ -22,16 +22,17 @@ class SettledReason:
     """
 
     def __init__(self) -> None:
-        self._told = self._seen = ""
+        self._told = self._seen = ModuleStatus(reason="")
         self._since_s = 0.0
 
-    def update(self, reason: str, now_s: float) -> str:
-        """Take the reason of now, empty for none, at a time in seconds; the one to tell."""
-        if not reason or not self._told:
-            self._told = self._seen = reason
-        elif kind_of(reason) != kind_of(self._seen):
-            self._seen, self._since_s = reason, now_s
-        elif kind_of(reason) != kind_of(self._told) and now_s - self._since_s >= STANDS_S:
+    def update(self, status: ModuleStatus, now_s: float) -> ModuleStatus:
+        """Take the link as it is at a time in seconds, without a reason where it stands; what to tell."""
+        kind = kind_of(status.reason)
+        if not status.reason or not self._told.reason:
+            self._told = self._seen = status
+        elif kind != kind_of(self._seen.reason):
+            self._seen, self._since_s = status, now_s
+        elif kind != kind_of(self._told.reason) and now_s - self._since_s >= STANDS_S:
             self._told = self._seen
         return self._told
 
@@ -52,8 +53,9 @@ class FaultAlarms:
         """
         if status.reason == NOT_CONNECTED_YET:
             return
-        reason = self._link_reason.update(status.reason, time.monotonic())
-        await self._tell(module_connection.result(reason, connected=status.connected))
+        told = self._link_reason.update(status, time.monotonic())
+        result = module_connection.result(told.reason, connected=status.connected, answered=told.answered)
+        await self._tell(result)
 
     async def check_journal(self) -> None:
         """Tell what has happened to the journal, and why it cannot be written."""

@@ -7,8 +7,13 @@ NAME = "ModuleConnection"
 """Published name."""
 
 
-def result(reason: str, *, connected: bool) -> RuleResult:
-    """Say what became of the connection; `reason` in words where there is none."""
+def result(reason: str, *, connected: bool, answered: bool = False) -> RuleResult:
+    """Say what became of the connection; `reason` in words where there is none.
+
+    `answered`: something answers in the module's place, so that neither power nor cable is why.
+    """
+    if answered:
+        return RuleResult(NAME, not connected, _another(reason))
     message = Message(
         f"The module does not answer, no cycles come in: {reason}. "
         "Check its power, its network cable and its address.",
@@ -16,6 +21,15 @@ def result(reason: str, *, connected: bool) -> RuleResult:
         "Stromversorgung, Netzwerkkabel und Adresse prüfen.",
     )
     return RuleResult(NAME, not connected, message)
+
+
+def _another(reason: str) -> Message:
+    return Message(
+        f"Something answers at the module's address, but not as this module does, and no cycles come in: "
+        f"{reason}. Check address, port and register map of the cell.",
+        "Unter der Adresse des Moduls antwortet etwas, aber nicht so wie dieses Modul, und es kommen keine "
+        f"Zyklen an: {german_link_fault(reason)}. Adresse, Port und Registerkarte der Zelle prüfen.",
+    )
 
 
 RULE = AlarmRule(

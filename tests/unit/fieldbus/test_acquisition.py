@@ -447,10 +447,10 @@ async def test_the_wrong_module_is_named_and_the_right_one_taken_when_it_comes(
         while told not in module.status.reason:
             await asyncio.sleep(0)
         assert module.status.reason.startswith(f"cell-1: 127.0.0.1:{server.port} device 1: ")
-        assert not module.status.connected
+        assert (module.status.connected, module.status.answered) == (False, True)
         device.put(register, fpga[register].expect)
         assert_whole(await waiting)
-        assert module.status.connected
+        assert (module.status.connected, module.status.answered) == (True, False)
     assert [s.connected for s in statuses[1:]] == [False, True, False]
 
 

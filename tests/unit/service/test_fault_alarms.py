@@ -19,7 +19,7 @@ from impactcell.journal.store import Journal
 from impactcell.numerics import compilation
 from impactcell.numerics.compilation import announce_compilation
 from impactcell.positioning.task_state_machine import TaskPhase, TaskState
-from impactcell.records import Alarm, Evidence
+from impactcell.records import Alarm, Evidence, ModuleStatus
 from impactcell.service.cell_task import CellTask
 from impactcell.service.fault_alarms import STANDS_S, FaultAlarms, SettledReason
 from impactcell.settings import read_cell
@@ -37,7 +37,7 @@ ANOTHER = STRANGER.replace("shows 7", "shows 8")
 
 def told(reasons: list[tuple[float, str]]) -> list[str]:
     settled = SettledReason()
-    return [settled.update(reason, time_s) for time_s, reason in reasons]
+    return [settled.update(ModuleStatus(reason=reason), time_s).reason for time_s, reason in reasons]
 
 
 def test_another_reason_is_told_once_it_has_stood() -> None:
@@ -135,13 +135,18 @@ async def test_a_lost_link_tells_why_it_is_lost_now(
         task._module._account.disconnect(SILENT)
         await says(task, name, "no connection within 500 ms (timeout_ms)")
         await acknowledge(task, name)
-        task._module._account.disconnect(STRANGER)
+        assert "Check its power, its network cable" in alarm(task, name).message
+        task._module._account.disconnect(STRANGER, answered=True)
         now = await says(task, name, "map prototype expects 18753")
         assert (now.active, now.acknowledged) == (True, True)
+        assert "Something answers" in now.message
+        assert "Check address, port and register map of the cell." in now.message
+        assert "Adresse, Port und Registerkarte der Zelle prüfen." in now.message_de
+        assert "cable" not in now.message
         assert "die Karte prototype erwartet 18753" in now.message_de
         for attempt in range(100):  # which of them stands cannot be seen, and nothing is told of numbers
             reason = STRANGER.replace("shows 7", f"shows {attempt}")
-            task._module._account.disconnect(reason)
+            task._module._account.disconnect(reason, answered=True)
             await asyncio.sleep(0)
         task._module._account.connect("the module")
         async with asyncio.timeout(PATIENCE_S):
