@@ -94,7 +94,9 @@ def _hint(config: CellConfig, error: FieldbusError) -> str:
     if isinstance(error, LinkError) and (place := _tls_place(config, error.__cause__)):
         return f"; see {place}"
     if isinstance(error, LinkError):
-        return f"; see {config.place('module.host', 'module.port')}"
+        return f"; {_address_place(config)}"
+    if isinstance(error, ProtocolError) and "Modbus TCP" in str(error):
+        return f"; give the module's own host and port, and its transport: {_address_place(config)}"
     if isinstance(error, ProtocolError) and "of the status block" in str(error):
         register_map = config.settings.module.register_map
         _, positions = yaml_loader.load(register_map)
@@ -103,6 +105,11 @@ def _hint(config: CellConfig, error: FieldbusError) -> str:
             f"them with its manual; see {register_map}:{positions.key(('registers', 'status_crc32'))}"
         )
     return f"; see {_line_of(config, str(error))}" if isinstance(error, WrongDeviceError) else ""
+
+
+def _address_place(config: CellConfig) -> str:
+    """Refer to the line that says where the module is."""
+    return f"see {config.place('module.host', 'module.port')}"
 
 
 def _tls_place(config: CellConfig, cause: BaseException | None) -> str:

@@ -93,8 +93,11 @@ GERMAN: Final = {
     r"more bytes than were asked for": "es kommen mehr Bytes als gefragt",
     r"a datagram of (\d+) bytes, which is no whole frame":
         r"ein Datagramm von \1 Bytes, das kein ganzes Telegramm ist",
-    r"not a Modbus TCP frame: protocol (\d+), length (\d+) \((\d+)\.\.(\d+)\)":
-        r"kein Telegramm von Modbus TCP: Protokoll \1, Länge \2 (\3 bis \4)",
+    r"not a Modbus TCP frame: protocol (\d+), length (\d+) \((\d+)\.\.(\d+)\); something other than "
+    r"Modbus TCP may listen there":
+        r"kein Telegramm von Modbus TCP: Protokoll \1, Länge \2 (\3 bis \4); dort antwortet vielleicht etwas "
+        "anderes als Modbus TCP",
+    r"(\w+) answers there, not Modbus TCP": r"dort antwortet \1, nicht Modbus TCP",
     r"the line does not become silent; does another master speak on it\?":
         "auf der Leitung wird es nicht still; spricht dort ein zweiter Master?",
     r"(\d+) readings of the status block do not fit its CRC":

@@ -107,6 +107,25 @@ async def test_a_module_that_stays_silent_has_its_device_id_named(tmp_path: Path
     assert re.search(r"device_id 7 may be wrong, .* \(see \S+press-1\.yaml:\d+:14\); or another client", err)
 
 
+async def test_another_protocol_at_the_address_is_named_with_its_line(tmp_path: Path) -> None:
+    class Web(asyncio.Protocol):
+        def data_received(self, _: bytes) -> None:
+            self.transport.write(b"HTTP/1.1 400 Bad Request\r\n\r\n")
+
+        def connection_made(self, transport: asyncio.BaseTransport) -> None:
+            assert isinstance(transport, asyncio.Transport)
+            self.transport = transport
+
+    server = await asyncio.get_running_loop().create_server(Web, "127.0.0.1", 0)
+    code, out, err = await probed(write_cell(tmp_path, server.sockets[0].getsockname()[1]))
+    server.close()
+    assert (code, out) == (1, "")
+    told = "HTTP answers there, not Modbus TCP; give the module's own host and port, and its transport: see "
+    assert re.search(
+        rf"press-1: 127\.0\.0\.1:\d+ device 1: {told}\S+press-1\.yaml:\d+:\d+$", err, re.MULTILINE
+    )
+
+
 async def test_a_module_that_closes_the_connection_may_be_held_by_another(tmp_path: Path) -> None:
     class Closing(asyncio.Protocol):
         def data_received(self, _: bytes) -> None:

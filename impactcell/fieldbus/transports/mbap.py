@@ -20,6 +20,8 @@ from impactcell.errors import ProtocolError
 HEADER: Final = struct.Struct(">HHHB")
 MAX_LENGTH: Final = 254
 """Unit and PDU; a PDU has at most 253 bytes."""
+_OTHER_PROTOCOLS: Final = {b"HTTP/": "HTTP", b"SSH-": "SSH", b"\x15\x03": "TLS", b"\x16\x03": "TLS"}
+"""What others begin with (RFC 9112, 4; RFC 4253, 4.2; RFC 8446, 5.1: an alert or a handshake)."""
 _AFTER_TRANSACTION: Final = struct.Struct(">HHB")
 
 
@@ -27,6 +29,17 @@ _AFTER_TRANSACTION: Final = struct.Struct(">HHB")
 def head_after_transaction(unit: int, pdu_length: int) -> bytes:
     """Give what stands between the transaction of a frame and its PDU."""
     return _AFTER_TRANSACTION.pack(0, pdu_length + 1, unit)
+
+
+def not_a_frame(received: bytes, protocol: int, length: int) -> ProtocolError:
+    """Say that what has a header of this protocol and length is no frame, and whose it is if known."""
+    for begin, name in _OTHER_PROTOCOLS.items():
+        if received.startswith(begin):
+            return ProtocolError(f"{name} answers there, not Modbus TCP")
+    return ProtocolError(
+        f"not a Modbus TCP frame: protocol {protocol}, length {length} (2..{MAX_LENGTH}); "
+        "something other than Modbus TCP may listen there"
+    )
 
 
 class FrameReader:
@@ -62,9 +75,7 @@ class FrameReader:
             while size - at >= header:
                 transaction, protocol, length, unit = unpack(buffer, at)
                 if protocol or not 2 <= length <= MAX_LENGTH:
-                    raise ProtocolError(
-                        f"not a Modbus TCP frame: protocol {protocol}, length {length} (2..{MAX_LENGTH})"
-                    )
+                    raise not_a_frame(buffer[at:], protocol, length)
                 end = at + 6 + length
                 if end > size:
                     break

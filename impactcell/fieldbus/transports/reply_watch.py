@@ -17,7 +17,7 @@ from pymodbus.framer import FramerRTU
 
 from impactcell.errors import ProtocolError
 from impactcell.fieldbus.codec import Request, check_reply
-from impactcell.fieldbus.transports.mbap import HEADER, MAX_LENGTH
+from impactcell.fieldbus.transports.mbap import HEADER, MAX_LENGTH, not_a_frame
 
 _CRC_LENGTH: Final = 2
 """Bytes of the CRC that ends an RTU frame (Modbus over Serial Line V1.02, section 2.5.1.2)."""
@@ -61,9 +61,7 @@ class MbapWatch:
         if len(received) >= HEADER.size:
             transaction, protocol, length, unit = HEADER.unpack_from(received)
             if protocol or not 2 <= length <= MAX_LENGTH:
-                raise ProtocolError(
-                    f"not a Modbus TCP frame: protocol {protocol}, length {length} (2..{MAX_LENGTH})"
-                )
+                raise not_a_frame(received, protocol, length)
             if transaction != self._transaction:
                 raise ProtocolError(f"an answer to transaction {transaction}, which is not open")
             if unit != self._device_id:

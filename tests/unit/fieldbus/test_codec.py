@@ -19,6 +19,7 @@ from impactcell.fieldbus.codec import (
 )
 from impactcell.fieldbus.registers import WIRE
 from impactcell.fieldbus.transports.mbap import FrameReader
+from impactcell.fieldbus.transports.reply_watch import MbapWatch
 
 PDU = st.binary(min_size=1, max_size=253)
 FRAMES = st.lists(st.tuples(st.integers(0, 65_535), st.integers(0, 255), PDU), max_size=6)
@@ -113,6 +114,24 @@ def test_pymodbus_reads_our_requests(address: int, values: list[int]) -> None:
 def test_a_header_that_is_not_modbus_is_named(header: bytes, told: str) -> None:
     with pytest.raises(ProtocolError, match=told):
         list(FrameReader().feed(header))
+
+
+@pytest.mark.parametrize(
+    ("received", "name"),
+    [
+        (b"HTTP/1.1 400 Bad Request\r\n", "HTTP"),
+        (b"SSH-2.0-OpenSSH_9.2\r\n", "SSH"),
+        (bytes.fromhex("15030100020216"), "TLS"),
+        (bytes.fromhex("16030300580200"), "TLS"),
+    ],
+)
+def test_another_protocol_is_named(received: bytes, name: str) -> None:
+    """It said `protocol 21584, length 12081` of a web server."""
+    told = f"^{name} answers there, not Modbus TCP$"
+    with pytest.raises(ProtocolError, match=told):
+        list(FrameReader().feed(received))
+    with pytest.raises(ProtocolError, match=told):
+        MbapWatch(1, 1, read_request(FunctionCode.READ_INPUT, 0, 1), datagram=False).take(received)
 
 
 @pytest.mark.parametrize(

@@ -139,6 +139,7 @@ def test_answers_that_do_not_fit_have_their_german() -> None:
             f"no connection: {NO_NAME}",
             "keine Verbindung: ein Rechnername hat zwischen seinen Punkten je 1 bis 63 Zeichen",
         ),
+        ("HTTP answers there, not Modbus TCP", "dort antwortet HTTP, nicht Modbus TCP"),
         (
             "connection lost: [Errno 104] Connection reset by peer",
             "Verbindung verloren: die Gegenseite hat die Verbindung abgebrochen",
