@@ -20,6 +20,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from impactcell.errors import SettingsError
+from impactcell.process.file_format import newer_format
 from impactcell.process.yaml_core_schema import CoreLoader, integer
 
 Location = tuple[str | int, ...]
@@ -249,6 +250,8 @@ def _explain(
         text += ", not a list" if isinstance(input_value, list) else ""
     if kind != "value_error" and isinstance(input_value, str | int | float | bool | None):
         text += f", not {'empty' if input_value is None else repr(input_value)}"
+    if location == ("format",) and (way_out := newer_format(input_value)):
+        text += f"; {way_out}"
     if isinstance(input_value, str) and re.fullmatch(r"[+-]?\d*,\d+", input_value):
         text += f"; {DECIMAL_POINT}: {input_value.replace(',', '.')}"
     return positions.value(location), f"{name}: {text}" if name else text

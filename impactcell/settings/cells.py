@@ -10,6 +10,7 @@ from impactcell.fieldbus.registers import RegisterMap
 from impactcell.prediction.model import Model
 from impactcell.process import yaml_loader
 from impactcell.process.yaml_loader import Positions
+from impactcell.settings.misnamed_files import MAP, MODEL, why_unusable
 from impactcell.settings.model_file import read_model
 from impactcell.settings.sections import CellSettings
 
@@ -70,11 +71,11 @@ def read_cell(path: Path) -> CellConfig:
     try:
         register_map = None if map_file is None else read_register_map(map_file, order)
     except SettingsError as error:
-        faults.append(str(error))
+        faults.append(_blamed(path, "module.register_map", map_file, MAP) or str(error))
     try:
         model = None if model_file is None else read_model(model_file)
     except SettingsError as error:
-        faults.append(str(error))
+        faults.append(_blamed(path, "model", model_file, MODEL) or str(error))
     if settings is None or register_map is None or model is None:
         raise SettingsError("\n".join(faults))
     return CellConfig(path, settings, register_map, model, positions)
@@ -93,6 +94,15 @@ def _referenced_files(path: Path) -> tuple[Path | None, Path | None]:
         _existing(path.parent / name) if isinstance(name, str) else None for name in names
     )
     return map_file, model_file
+
+
+def _blamed(path: Path, key: str, file: Path | None, kind: str) -> str:
+    """Put the fault of a file that is no `kind` where a cell file names it; empty if it is one."""
+    why = "" if file is None else why_unusable(file, kind)
+    if not why:
+        return ""
+    _, positions = yaml_loader.load(path)
+    return yaml_loader.format_error(path, positions.value(key.split(".")), f"{key}: {why}")
 
 
 def _existing(file: Path) -> Path | None:
