@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from impactcell.errors import LinkError
+from impactcell.fieldbus.hosts import host_identity
 
 NO_NAME: Final = "a host's name has 1 to 63 characters between its dots"
 """Why a name cannot be looked up, nor be that of a certificate: the codec `idna` refuses it."""
@@ -136,7 +137,7 @@ class ModuleLink:
     @property
     def endpoint(self) -> tuple[str, int]:
         """What leads to the same endpoint shares one connection: host and port, or the serial port and 0."""
-        return (self.host, self.port) if self.serial is None else (self.serial.device, 0)
+        return (host_identity(self.host), self.port) if self.serial is None else (self.serial.device, 0)
 
     @property
     def patience(self) -> str:

@@ -6,6 +6,7 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from impactcell.errors import SettingsError
+from impactcell.fieldbus.hosts import host_identity
 from impactcell.settings.cells import CellConfig, read_cell
 from impactcell.settings.fields import Section
 
@@ -68,7 +69,9 @@ def _port_faults(cell: CellConfig, other: CellConfig) -> Iterator[str]:
     for key, (host, port) in _listeners(cell).items():
         for other_key, (other_host, other_port) in _listeners(other).items():
             is_told = key == other_key or (cell is other and key > other_key)
-            meet = host == other_host or not {host, other_host}.isdisjoint(EVERY_HOST)
+            meet = host_identity(host) == host_identity(other_host) or not {host, other_host}.isdisjoint(
+                EVERY_HOST
+            )
             if port and port == other_port and meet and not is_told:
                 keys = (key, other_key) if cell is other else (key,)
                 message = f"{key} and {other_key}{whose} are both port {port}; change one"
@@ -78,7 +81,7 @@ def _port_faults(cell: CellConfig, other: CellConfig) -> Iterator[str]:
 def _endpoint(cell: CellConfig) -> tuple[str, int]:
     """Where the module is; cells of one endpoint share its connection."""
     module = cell.settings.module
-    return (module.host, module.port) if module.serial is None else (module.serial.device, 0)
+    return (host_identity(module.host), module.port) if module.serial is None else (module.serial.device, 0)
 
 
 def _acknowledgement_target(cell: CellConfig) -> tuple[tuple[str, int], int, Path]:

@@ -156,6 +156,26 @@ def test_faults_of_cell_map_and_model_at_once(config: Path) -> None:
     assert "models/bad.yaml" in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("host", "is_same"),
+    [("localhost", True), ("'::1'", True), ("0x7f.1", True), ("127.0.0.2", False), ("press-1", False)],
+)
+def test_one_module_is_one_however_its_address_is_written(
+    config: Path, monkeypatch: pytest.MonkeyPatch, host: str, is_same: bool
+) -> None:
+    """And nobody is asked for a name, which may be another's tomorrow."""
+    monkeypatch.delattr("socket.getaddrinfo")
+    first = edited(config, "host: 127.0.0.1", "host: 127.0.0.1", "first")
+    second = edited(config, "cell: prototype", "cell: other", "second")
+    second.write_text(second.read_text(encoding="utf-8").replace("host: 127.0.0.1", f"host: {host}"))
+    said = ""
+    try:
+        read_cells([first, second])
+    except SettingsError as fault:
+        said = str(fault)
+    assert ("same module and register map" in said) == is_same
+
+
 @pytest.mark.slow
 def test_cells_of_one_process_do_not_share_what_is_one_cells(config: Path) -> None:
     journal = f"cell: prototype\njournal: {{file: {config / 'one.sqlite'}}}"
