@@ -6,7 +6,6 @@ PyYAML alone follows 1.1, where each of these surprises.
 
 import difflib
 import itertools
-import re
 import types
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,6 +20,7 @@ from pydantic_core import ErrorDetails
 
 from impactcell.errors import SettingsError
 from impactcell.process.file_format import newer_format
+from impactcell.process.written_numbers import DECIMAL_POINT, number_meant
 from impactcell.process.yaml_core_schema import CoreLoader, integer
 
 Location = tuple[str | int, ...]
@@ -32,8 +32,6 @@ MOST_NODES = 200_000
 """A file of nested aliases or merges can describe more than memory holds; no honest one comes near this."""
 
 
-DECIMAL_POINT: Final = "decimals have a point, not a comma"
-"""Way out of `1,5`, which is a text, or within braces a 1 and a key 5."""
 _WAYS_OUT: Final = {
     "found character '\\t' that cannot start any token": "a tab; YAML is indented with spaces",
     "mapping values are not allowed here": (
@@ -252,8 +250,8 @@ def _explain(
         text += f", not {'empty' if input_value is None else repr(input_value)}"
     if location == ("format",) and (way_out := newer_format(input_value)):
         text += f"; {way_out}"
-    if isinstance(input_value, str) and re.fullmatch(r"[+-]?\d*,\d+", input_value):
-        text += f"; {DECIMAL_POINT}: {input_value.replace(',', '.')}"
+    if kind.startswith(("int", "float")) and (meant := number_meant(input_value)):
+        text += f"; {meant}"
     return positions.value(location), f"{name}: {text}" if name else text
 
 

@@ -63,7 +63,11 @@ def test_a_name_or_an_address_is_a_host(config: Path, host: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "complaint"),
     [
-        ("port: 15020", "port: '15020'", "module.port: should be a valid integer, not '15020'"),
+        (
+            "port: 15020",
+            "port: '15020'",
+            "module.port: should be a valid integer, not '15020'; leave out the quotes: 15020",
+        ),
         (
             "host: 127.0.0.1",
             "host: http://10.0.0.5",
@@ -122,7 +126,7 @@ def test_a_name_or_an_address_is_a_host(config: Path, host: str) -> None:
         ("format: 1", "format: 2", "format"),
         ("cell: prototype", "cell: 7", "valid string"),
         ("../models/prototype.yaml", "none.yaml", "no file"),
-        ("../models/prototype.yaml", "../maps/fpga-v1.yaml", "model: .*fpga-v1.yaml is a register map, not a model"),
+        ("../models/prototype.yaml", "../maps/fpga-v1.yaml", "model: .* is a register map, not a model"),
         ("../maps/fpga-v1.yaml", "../models/prototype.yaml", "prototype.yaml"),
         ("format: 1", "format: 1\n\tcell: x", "4:1: a tab; YAML is indented with spaces"),
     ],
