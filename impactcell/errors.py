@@ -30,6 +30,7 @@
     │   └── ModbusExceptionError  the peer refused a request, with its code (retry)
     ├── JournalError
     │   ├── ForeignJournalError   not ours, or of another version; never overwritten
+    │   ├── UnstoredError         the service ended with entries that no journal took
     │   ├── JournalDamagedError   not what was written (retry: it is put aside)
     │   ├── JournalGoneError      the file was removed or replaced in use (retry)
     │   └── JournalUnavailableError  the file cannot be opened or written now (retry)
@@ -200,6 +201,10 @@ class JournalError(ImpactCellError):
 
 class ForeignJournalError(JournalError):
     """A file that is not this cell's journal, or of another format version; it is never overwritten."""
+
+
+class UnstoredError(JournalError):
+    """The service ended with entries that its journals could not take."""
 
 
 class JournalDamagedError(JournalError):

@@ -16,6 +16,8 @@ EXIT_CODES = {
     ExitCode.FAILED: "failed while working: no answer of a module, a journal, a fit that is not possible",
     ExitCode.BAD_INPUT: "bad input: an option, a cell file, map, model, campaign, series, measurement or "
     "effect, certificate or file of users, or another cell's journal; the message says what and where",
+    ExitCode.LOST: "the service ended as it was told to, and a journal could not take all that it had; the "
+    "log says which and why",
     ExitCode.INTERRUPTED: "interrupted by Ctrl-C",
 }
 """What each is for."""

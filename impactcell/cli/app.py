@@ -1,6 +1,7 @@
 """The command line: every verb is one function here, and each calls one function elsewhere.
 
-Exit codes: 0 done, 1 failed while working, 2 bad input, 130 interrupted.
+Exit codes: 0 done, 1 failed while working, 2 bad input, 3 ended with entries that no journal took,
+130 interrupted.
 """
 
 import gc

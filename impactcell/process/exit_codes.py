@@ -18,6 +18,7 @@ from impactcell.errors import (
     MeasurementError,
     SeriesError,
     SettingsError,
+    UnstoredError,
 )
 
 _BAD_INPUT = (
@@ -41,6 +42,8 @@ class ExitCode(enum.IntEnum):
     DONE = 0
     FAILED = 1
     BAD_INPUT = 2
+    LOST = 3
+    """The service ended as it was told to, and could not store all that it had."""
     INTERRUPTED = 130
     """As a shell says it of a program that Ctrl-C has ended."""
 
@@ -63,7 +66,7 @@ def exit_code_of(program: str, work: Callable[[], int | None]) -> int:
         return ExitCode.BAD_INPUT
     except ImpactCellError as error:
         sys.stderr.write(f"{program}: {error}\n")
-        return ExitCode.FAILED
+        return ExitCode.LOST if isinstance(error, UnstoredError) else ExitCode.FAILED
     except OSError as error:
         if error.filename is None and error.errno in _UNWRITABLE:
             _leave_output()

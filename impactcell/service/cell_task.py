@@ -131,9 +131,9 @@ class CellTask:
         finally:
             await self._module.close()
 
-    async def close(self) -> None:
-        """Finish what has begun, and close the journal."""
-        await self.worker.close()
+    async def close(self) -> int:
+        """Finish what has begun, and close the journal; says how many entries it could not take."""
+        return await self.worker.close()
 
     async def reload(self) -> None:
         """Take over from the cell's files what can change without a restart: model, tracking, alarms."""

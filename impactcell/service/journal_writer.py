@@ -5,6 +5,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Collection
 from pathlib import Path
+from typing import Final
 
 from impactcell.errors import JournalDamagedError, JournalError, JournalGoneError
 from impactcell.fieldbus.taken_cycles import NOTHING_BEFORE, TakenBefore
@@ -29,6 +30,11 @@ _SERIAL = "serial_number"
 """Under what a journal keeps which module made its last cycle."""
 
 Entry = Callable[[Journal], None]
+_READ_AGAIN: Final = (
+    "cycles among them are read again when the service is started next, as far as the module's ring still "
+    "has them: put that right, and start it"
+)
+"""What becomes of what could not be stored: no module is told that it may forget what is not durable."""
 
 
 def open_journal(path: Path, cell: str) -> tuple[Journal, str]:
@@ -251,16 +257,23 @@ class JournalWriter:
             + (f"; what is damaged was put aside as {aside.name}" if aside is not None else "")
         )
 
-    def close(self) -> None:
-        """Close the journal, after a last attempt to write what waits; what cannot be written is lost."""
+    def close(self) -> int:
+        """Close the journal, after a last attempt to write what waits.
+
+        Returns
+        -------
+        int
+            How many entries cannot be written, and are lost.
+        """
         if self.journal is None:
-            return
+            return 0
         self.retry()
         if self._waiting:
             self._log.error(
-                "entries of the journal lost at the end of the service: %d; %s",
+                "entries of the journal lost at the end of the service: %d; %s; %s",
                 len(self._waiting),
                 self.fault,
+                _READ_AGAIN,
             )
         self.journal.close()
         name = self.journal.path.name
@@ -271,3 +284,4 @@ class JournalWriter:
                 "What is stored is in both: to copy the journal, copy %s and %s together",
                 log, name, name, log.name,
             )  # fmt: skip
+        return len(self._waiting)

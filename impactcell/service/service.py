@@ -11,7 +11,7 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 
 from impactcell import cell as core
 from impactcell.alarms.rules import journal_fault
-from impactcell.errors import ForeignJournalError, JournalError
+from impactcell.errors import ForeignJournalError, JournalError, UnstoredError
 from impactcell.fieldbus.transports import Transports
 from impactcell.numerics.compilation import COMPILING, on_compilation
 from impactcell.opcua.large_requests import leave_full_rounds_to_the_server
@@ -86,7 +86,13 @@ class Service:
         self._transports = {cell.name: shared.transport_for(module_link(cell)) for cell in cells}
 
     async def run(self, stop: asyncio.Event, started: Callable[[], None] | None = None) -> None:
-        """Run until `stop` is set; `started` is called when every endpoint listens."""
+        """Run until `stop` is set; `started` is called when every endpoint listens.
+
+        Raises
+        ------
+        UnstoredError
+            Journals could not take all at the end.
+        """
         self._create_tasks()
         async with contextlib.AsyncExitStack() as stack:
             await stack.enter_async_context(self._monitoring())
@@ -119,7 +125,9 @@ class Service:
                 for task in tasks:
                     task.cancel()
                 await asyncio.gather(*tasks, return_exceptions=True)
-                await asyncio.gather(*(running.close() for running in self.running.values()))
+                lost = await asyncio.gather(*(running.close() for running in self.running.values()))
+        if sum(lost):
+            raise UnstoredError(f"entries that no journal could take: {sum(lost)}; the log says why")
 
     def _create_tasks(self) -> None:
         """Make every cell that can run."""
@@ -215,6 +223,8 @@ def run(cells: Sequence[CellConfig]) -> None:
     ------
     SettingsError, JournalError
         The service cannot start.
+    UnstoredError
+        It ended, and not all could be stored.
     KeyboardInterrupt
         Ended by Ctrl-C, after a clean shutdown.
     """

@@ -202,11 +202,12 @@ class CellWorker:
 
         await self.run(swap)
 
-    async def close(self) -> None:
-        """Finish what has begun, and close the journal."""
+    async def close(self) -> int:
+        """Finish what has begun, and close the journal; says how many entries it could not take."""
         self._closing.set()
-        await self.run(self._journal_writer.close)
+        lost = await self.run(self._journal_writer.close)
         self._thread.shutdown(wait=False)
+        return lost
 
     async def run(self, work: Callable[[], T]) -> T:
         """Do some work in the cell's thread, after all that was asked for before."""
