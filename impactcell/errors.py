@@ -18,6 +18,7 @@
     │   ├── NegativeRootError     equation (5) has no real root at this distance
     │   └── NotConvergedError     the waveform fit did not reach a minimum
     ├── PositioningError          target or command refused; nothing has been commanded
+    │   └── RasterError           values that can be commanded which are none
     ├── DiscrepancyError          the workflow cannot give an answer from these data
     ├── FieldbusError
     │   ├── MapError              a map that overlaps itself or leaves the registers
@@ -124,6 +125,10 @@ class NotConvergedError(PredictionError):
 
 class PositioningError(ImpactCellError):
     """A target or command that is refused; nothing has been commanded."""
+
+
+class RasterError(PositioningError):
+    """Values that can be commanded, of which there are none: no step, or an end before the beginning."""
 
 
 class DiscrepancyError(ImpactCellError):

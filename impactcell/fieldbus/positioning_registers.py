@@ -38,7 +38,13 @@ def not_placing(registers: RegisterMap) -> Iterator[str]:
 
 
 def commanded_values(registers: RegisterMap, name: str) -> Raster:
-    """Return the values above 0 that can be commanded through a register, SI: any through one of floats."""
+    """Return the values above 0 that can be commanded through a register, SI: any through one of floats.
+
+    Raises
+    ------
+    RasterError
+        No code of it stands for a value above 0.
+    """
     register = registers.registers.get(name)
     codes = None if register is None else register.saturation or code_range(register.kind)
     if register is None or codes is None:

@@ -81,8 +81,8 @@ class PlannerLimits:
         for name in LIMITS:
             check_limit(name, getattr(self, name))
         check_overshoot_probability(self.overshoot_probability)
-        for name in ("velocity_raster", "stroke_raster"):
-            check_raster(name, getattr(self, name))
+        for name, limit in (("velocity_raster", "max_velocity_m_s"), ("stroke_raster", "max_stroke_m")):
+            check_raster(name, getattr(self, name), limit, getattr(self, limit))
 
     @property
     def commandable(self) -> tuple[float, float, float, Raster, Raster]:

@@ -64,8 +64,8 @@ def check_limit(name: str, value: float) -> None:
         )
 
 
-def check_raster(name: str, raster: Raster) -> None:
-    """Refuse what is no raster.
+def check_raster(name: str, raster: Raster, limit_name: str, limit: float) -> None:
+    """Refuse what is no raster, or one without a value up to the limit (SI) of this name.
 
     Raises
     ------
@@ -75,6 +75,12 @@ def check_raster(name: str, raster: Raster) -> None:
         raise PositioningError(
             f"tap planner: {name} is to be an impactcell.numerics.raster.Raster, Raster(1e-3, 1e-3) say, "
             f"not {raster!r}"
+        )
+    if not raster.has_up_to(limit):
+        raise PositioningError(
+            f"tap planner: {name} begins with {raster.least:g}, above {limit_name}, {limit:g}: no tap can be "
+            f"commanded; raise {limit_name} to {raster.least:g} at least, or see the unit of the raster, "
+            "which is in SI"
         )
 
 

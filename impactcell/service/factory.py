@@ -9,11 +9,12 @@ from impactcell.alarms import RULES, AlarmSettings
 from impactcell.alarms.rules import wear_limit, wear_warning
 from impactcell.cell import CellDesign
 from impactcell.cell.preprocessing import CaptureDefaults
-from impactcell.errors import PositioningError
+from impactcell.errors import PositioningError, RasterError
 from impactcell.fieldbus.link import ModuleLink, SerialLine, TlsFiles
 from impactcell.fieldbus.positioning_registers import commanded_values
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.journal.retention import Retention
+from impactcell.numerics.raster import ANY_VALUE, Raster
 from impactcell.positioning import SafetyLimits, TapPlanner, task_state_machine
 from impactcell.positioning.prediction_watch import POSITION_NOISE_M
 from impactcell.records import MM_PER_MIN
@@ -232,10 +233,23 @@ def tap_planner(
             plant=design.model.plant,
             max_force_n=limits.force_n,
             two_sided=limited.two_sided,
-            velocity_raster=commanded_values(registers, "command_velocity"),
-            stroke_raster=commanded_values(registers, "command_stroke"),
+            velocity_raster=_planned_values(registers, "command_velocity", limits.velocity_m_s),
+            stroke_raster=_planned_values(registers, "command_stroke", limits.stroke_m),
             travel_m=limits.travel_m,
             position_noise_m=max(0.5 * limited.resolution_m, POSITION_NOISE_M),
         )
     except PositioningError as refused:
         raise PositioningError(f"{cell.path}: {refused}") from refused
+
+
+def _planned_values(registers: RegisterMap, name: str, limit: float) -> Raster:
+    """Return the values that a register commands; any where none is within the limit (SI).
+
+    Then each tap is refused as it is to be commanded, and the cell's friction goes on being told;
+    `impactcell check` says so beforehand.
+    """
+    try:
+        values = commanded_values(registers, name)
+    except RasterError:
+        return ANY_VALUE
+    return values if values.has_up_to(limit) else ANY_VALUE

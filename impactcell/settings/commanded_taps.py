@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
+from impactcell.errors import RasterError
 from impactcell.fieldbus.positioning_registers import commanded_values
 from impactcell.records import MM_PER_MIN
 from impactcell.settings.cells import CellConfig
@@ -34,11 +35,17 @@ def doubted_commands(cell: CellConfig) -> Iterator[tuple[tuple[str, ...], str, b
         ),
         ("command_stroke", "max_stroke_mm", longest, "mm", 1e-3, coarse_stroke),
     ):
-        step, first, last = (value / si for value in commanded_values(cell.register_map, name))
-        if first > min(last, limit):
+        try:
+            values = commanded_values(cell.register_map, name)
+            has_any = values.has_up_to(limit * si)
+        except RasterError:
+            has_any = False
+        if not has_any:
             told = f"register {name} has no value between 0 and {limit:g} {unit}: no tap can be commanded"
             yield ("actuator", key), told, True
-        elif last < limit:
+            continue
+        step, last = values.step / si, values.last / si
+        if last < limit:
             told = f"register {name} ends at {last:g} {unit}: no tap is commanded from there to {limit:g}"
             yield ("actuator", key), told, False
         if step:

@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from impactcell.errors import RasterError
 from impactcell.fieldbus.positioning_registers import commanded_values, is_ahead, next_sequence
 from impactcell.fieldbus.register import Register
+from impactcell.fieldbus.register_types import code_range
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.numerics.raster import ANY_VALUE
 
@@ -29,8 +31,11 @@ def test_the_ends_and_the_steps_of_a_register_are_shown_again(
     if saturation is not None and kind != "i16":
         saturation = (max(saturation[0], 0), saturation[1])
     register = Register("x", 0, kind, unit="mm", scale=scale, offset=offset, saturation=saturation)
-    values = commanded_values(a_map(register), "x")
-    if values.last < values.first:  # no code is above 0
+    try:
+        values = commanded_values(a_map(register), "x")
+    except RasterError:
+        most = max(register.saturation or code_range(kind) or (0, 0))
+        assert float(register.decode(register.encode(register.offset + scale * most))) <= 1e-9 * scale
         return
     assert 0.0 < values.first <= values.last
     assert values.first > 1e-9 * values.step

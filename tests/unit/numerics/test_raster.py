@@ -1,10 +1,14 @@
 """A raster is found however its values were scaled and written, and not where there is none."""
 
+import math
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from impactcell.errors import RasterError
 from impactcell.numerics.raster import ANY_VALUE, NEARLY_EQUAL, Raster, raster_of
 
 CODES = np.random.default_rng(2).integers(-400, 9000, 700)
@@ -40,12 +44,11 @@ def test_values_of_a_raster_are_the_largest_up_to_what_is_asked_for(
     codes = np.rint(given_ / step)
     np.testing.assert_allclose(given_, codes * step, rtol=2 * NEARLY_EQUAL)
     assert (np.diff(codes) > 0).all()
-    assert codes[0] >= first
-    assert codes[-1] <= first + steps
+    assert ((codes >= first) & (codes <= first + steps)).all()
     wanted = {min(int(value / step + NEARLY_EQUAL), first + steps) for value in asked}
-    assert set(codes.astype(int)) == ({code for code in wanted if code >= first} or {first})
-    if asked[-1] >= raster.first:
-        assert given_[-1] <= asked[-1]
+    assert set(codes.astype(int)) == {code for code in wanted if code >= first}
+    assert (given_ <= asked[-1]).all()
+    assert raster.has_up_to(asked[-1]) == bool(given_.size)
 
 
 def test_a_limit_that_is_a_whole_number_of_steps_is_reached_and_not_passed() -> None:
@@ -60,3 +63,33 @@ def test_a_limit_that_is_a_whole_number_of_steps_is_reached_and_not_passed() -> 
 def test_any_value_is_left_as_it_is() -> None:
     asked = np.array([0.1, 0.1, np.inf])
     assert ANY_VALUE.at_most(asked) is asked
+
+
+@pytest.mark.parametrize(
+    ("numbers", "told"),
+    [
+        ((-1e-3,), "a step above 0, not -0.001"),
+        ((math.nan,), "a step above 0, not nan"),
+        ((math.inf,), "a step above 0, not inf"),
+        (("x",), "a step above 0, not 'x'"),
+        ((True,), "a step above 0, not True"),
+        ((0.0, 0.5), "a step above 0, not 0.0"),
+        ((0.0, 0.0, 0.5), "a step above 0, not 0.0"),
+        ((1e-3, -0.1), "begins with a number of 0 or more, not -0.1"),
+        ((1e-3, math.nan), "begins with a number of 0 or more, not nan"),
+        ((1e-3, "0.1"), "begins with a number of 0 or more, not '0.1'"),
+        ((1e-3, 0.1, math.nan), "ends with a number, or inf where it has no end, not nan"),
+        ((1e-3, 0.1, None), "ends with a number, or inf where it has no end, not None"),
+        ((1e-3, 0.5, 0.1), "begins with 0.5 cannot end with 0.1"),
+    ],
+)
+def test_a_raster_that_has_no_values_is_refused(numbers: tuple[float, ...], told: str) -> None:
+    with pytest.raises(RasterError, match=re.escape(told)):
+        Raster(*numbers)
+
+
+def test_a_raster_may_be_made_of_whole_numbers_and_of_those_of_numpy() -> None:
+    assert Raster(1, 2, 3).at_most(np.array([2.5])).tolist() == [2.0]
+    assert Raster(np.float64(0.5), np.int64(1)).least == 1.0
+    assert Raster(0.5).least == 0.5
+    assert not Raster(0.2).has_up_to(0.1)

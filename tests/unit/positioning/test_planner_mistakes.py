@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from impactcell.errors import PhysicsError, PositioningError
+from impactcell.numerics.raster import Raster
 from impactcell.physics import Plant
 from impactcell.physics.closed_form import displacement_of
 from impactcell.positioning import Tap, TapPlanner, Unreachable
@@ -120,6 +121,16 @@ def test_a_limit_that_no_cell_has_is_named(options: dict[str, float]) -> None:
         ({"travel_m": (0.0, 40.0)}, r".*no travel ends at 40 m; if that was meant in mm, give \(0, 0.04\)"),
         ({"velocity_raster": 0.001}, "velocity_raster is to be an .*Raster.* not 0.001"),
         ({"stroke_raster": None}, "stroke_raster is to be an .*Raster.* not None"),
+        (
+            {"velocity_raster": Raster(0.2, 0.2)},
+            "velocity_raster begins with 0.2, above max_velocity_m_s, 0.1: no tap can be commanded; raise",
+        ),
+        ({"velocity_raster": Raster(0.2)}, "velocity_raster begins with 0.2, above max_velocity_m_s, 0.1"),
+        ({"velocity_raster": Raster(1e-3, 0.15)}, "velocity_raster begins with 0.15, above"),
+        (
+            {"stroke_raster": Raster(5e-3, 5e-3)},
+            "stroke_raster begins with 0.005, above max_stroke_m, 0.0015: no tap .* max_stroke_m to 0.005",
+        ),
         ({"two_sided": "no"}, "two_sided is to be True or False, not 'no'"),
         ({"two_sided": None}, "two_sided is to be True or False, not None"),
     ],

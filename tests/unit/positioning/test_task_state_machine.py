@@ -38,7 +38,10 @@ def planner() -> TapPlanner:
 
 
 def test_a_cell_whose_registers_only_command_more_than_its_limits_makes_no_tap() -> None:
-    for coarse in ({"velocity_raster": Raster(0.2, 0.2, 10.0)}, {"stroke_raster": Raster(2e-3, 2e-3, 1.0)}):
+    for coarse in (
+        {"velocity_raster": Raster(0.2, 0.2, 10.0), "max_velocity_m_s": 0.2},
+        {"stroke_raster": Raster(2e-3, 2e-3, 1.0), "max_stroke_m": 2e-3},
+    ):
         made = TapPlanner(tolerance_m=50e-6, **coarse)
         made.observe_friction(0.19, 0.004)
         with pytest.raises(PositioningError, match=r"press 3: a (tap|stroke) .*is not allowed, the limit is"):

@@ -7,9 +7,11 @@ import pytest
 
 from impactcell.fieldbus.status_block import PositioningStatus
 from impactcell.fieldbus.tap_commands import Objection, TapCommand
-from impactcell.service.factory import cell_design
+from impactcell.positioning import Tap
+from impactcell.service.factory import cell_design, positioning_cell, tap_planner
 from impactcell.service.positioning import PositioningTask
 from impactcell.settings import CellConfig
+from impactcell.settings.commanded_taps import doubted_commands
 from tests.told_module import ToldModule, block, task_of, worker_of
 
 
@@ -83,3 +85,30 @@ async def test_a_reload_plans_for_the_map_that_the_module_is_read_with(
     velocity, stroke = task.state.next_velocity_m_s * 1e3, task.state.next_stroke_m * 1e4
     assert (velocity, stroke) == (pytest.approx(round(velocity)), pytest.approx(round(stroke)))
     await worker.close()
+
+
+@pytest.mark.parametrize(
+    ("limits", "offset"),
+    [({"max_velocity_mm_per_min": 30.0}, 0.0), ({"max_stroke_mm": 0.05}, 0.0), ({}, -1e6)],
+)
+def test_a_cell_whose_registers_command_no_tap_runs_and_none_is_commanded(
+    coarse: CellConfig, limits: dict[str, float], offset: float
+) -> None:
+    """Its friction is told all the same; `impactcell check` names the register."""
+    registers = coarse.register_map
+    stroke = replace(registers["command_stroke"], offset=offset)
+    registers = replace(registers, registers={**registers.registers, "command_stroke": stroke})
+    actuator = coarse.settings.actuator.model_copy(update=limits)
+    cell = replace(
+        coarse, register_map=registers, settings=coarse.settings.model_copy(update={"actuator": actuator})
+    )
+    assert any(is_fault and "no tap can be commanded" in told for _, told, is_fault in doubted_commands(cell))
+    planner = tap_planner(cell, positioning_cell(cell), cell_design(cell), registers)
+    tap = planner.next_tap(0.03, 18.9)
+    if isinstance(tap, Tap):
+        command = TapCommand(tap.velocity_m_s, tap.stroke_m, tap.direction)
+        shown = [
+            float(registers[name].decode(registers[name].encode(value)))  # type: ignore[arg-type]
+            for name, value in command.parameters.items()
+        ]
+        assert shown != pytest.approx(list(command.parameters.values()), rel=1e-6)

@@ -227,6 +227,11 @@ def test_registers_that_command_coarse_taps_or_none_are_told(tmp_path: Path) -> 
     none, ends = (text for text in _said_of_commands(tmp_path, content) if "whole steps" not in text)
     assert "register command_stroke has no value between 0 and 1.5 mm: no tap can be commanded" in none
     assert "note: " not in none
+    registers["command_stroke"] |= {"scale": 1.0, "offset": -1e6}  # no code of it is above 0
+    assert any(
+        "command_stroke has no value between 0 and 1.5" in t for t in _said_of_commands(tmp_path, content)
+    )
+    registers["command_stroke"] |= {"scale": 2.0, "offset": 0.0}
     assert "note: register command_velocity ends at 3932.1 mm/min: no tap is commanded from there to" in ends
 
 
