@@ -59,6 +59,10 @@ GERMAN: Final = {
         r"das Teil kann nicht bei \g<a> m liegen; Positionen werden in Metern angegeben",
     r"the part cannot lie (?P<a>\S+) m from its target; distances are in metres":
         r"das Teil kann nicht \g<a> m von seinem Ziel liegen; Abstände werden in Metern angegeben",
+    r"the part cannot lie (?P<a>\S+) m from its target; distances are in metres: if that was meant in "
+    r"(?P<unit>\S+), give (?P<b>\S+)":
+        r"das Teil kann nicht \g<a> m von seinem Ziel liegen; Abstände werden in Metern angegeben: waren "
+        r"\g<unit> gemeint, \g<b> angeben",
     _REMAIN + r"and every tap for a part of (?P<b>\S+) kg overshoots (?P<c>\S+) µm " + _PROBABLY
     + r" \(the safest with (?P<d>\S+)\)":
         _REMAIN_GERMAN + r"und jeder Stoß auf ein Teil von \g<b> kg geht " + _PROBABLY_GERMAN

@@ -115,7 +115,7 @@ class TapPlanner:
         return self._posterior
 
     def resume(self, posterior: PlannerPosterior) -> None:
-        """Go on from what had been learned earlier.
+        """Go on from what had been learned earlier; taps in a row that moved nothing are counted anew.
 
         Raises
         ------
@@ -154,8 +154,8 @@ class TapPlanner:
         Raises
         ------
         PositioningError
-            For a distance, mass or position that no part has, one in mm for instance, and for limits that
-            were changed to what no cell can have.
+            For a distance, mass or position that no part has, as in mm: a target further outside the travel
+            than that is long, or 1 m away where none is stated; for limits changed to what no cell can have.
         """
         self._take_limits()
         questions.check_question(remaining_m, mass_kg, position_m, self.travel_m)
@@ -187,9 +187,11 @@ class TapPlanner:
         Raises
         ------
         PositioningError
-            For what is no tap, as `Unreachable`, or one that no cell makes; for a displacement or a mass that
-            is not a number; for a displacement against the tap, or far beyond what taps make, as one in mm.
+            For what is no tap, or one that no cell makes: above 1 m/s and the limit, above 0.1 m, or from an
+            end without an actuator (beyond limits that were lowered it is learned from); for a mass too light
+            to plan for; for a displacement against the tap, or far beyond what taps make, as one in mm.
         """
+        questions.check_is_made(tap, mass_kg, self.max_velocity_m_s, self._lightest_kg, self.two_sided)
         questions.check_observation(tap, moved_m, mass_kg, self._posterior.mu_k * self._gravity)
         self._still = self._still + 1 if abs(moved_m) < least_step_m(self.position_noise_m) else 0
         self._posterior = posterior_after(
@@ -202,7 +204,7 @@ class TapPlanner:
         Raises
         ------
         PositioningError
-            For a coefficient that is not positive or that no surface has, or a deviation that is negative.
+            For a coefficient that is not positive, a negative deviation, or either as no surface has it.
         """
         questions.check_friction(mu_k, std)
         self._posterior = model_hypotheses.condition_on_friction(

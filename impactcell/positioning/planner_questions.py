@@ -2,14 +2,23 @@
 
 import math
 
+import numpy as np
+
 from impactcell.errors import PositioningError
 from impactcell.positioning.planner_posterior import PlannerPosterior
 from impactcell.positioning.tap import Tap
-from impactcell.records import Signature
+from impactcell.records import MM_PER_MIN, Signature
 from impactcell.records.plausible_range import meant_in
 
 FURTHEST_M = 10.0
-"""Further from the origin of its axis, or from its target, no part of a cell lies: mm have been given."""
+"""Further from the origin of its axis no part of a cell lies: mm have been given."""
+LONGEST_WAY_M = 1.0
+"""From there on nobody sends a part by taps where no travel is stated: mm have been given. Our choice; it
+would take a hundred of the longest taps."""
+USUAL_WAY_M = 0.2
+"""Up to there parts are sent, to tell in which unit a distance may have been said."""
+FASTEST_M_S = 1.0
+"""Faster no cell taps whose own limit is not above it: mm/s or mm/min have been given. Our choice."""
 FURTHER = 20.0
 """Times what a part slides at the speed of its actuator, v²/(2 mu_k g), and the stroke: beyond it no tap
 moves one. The springiest contact gives it four times as much."""
@@ -21,17 +30,21 @@ LARGEST_FRICTION = 10.0
 """No dry pair of materials comes near."""
 NOISIEST_M = 1e-3
 """Standard deviation of a displacement beyond which nobody places parts: µm or mm have been given."""
+ROUNDED = 1e-6
+"""Relative difference that rounding makes: more than that of a register with 32 bits."""
 MOST_DAMPED = 4.0
 """Damping over critical damping of a contact up to which taps are foretold: beyond it a part hardly springs
 back, and the closed form is off by more than a tenth."""
 
 
 def is_number(value: object) -> bool:
-    """Whether it is a finite number.
+    """Whether it is a finite number; True and False are none.
 
-    >>> is_number(0.1), is_number("0.1"), is_number(None), is_number(math.inf)
-    (True, False, False, False)
+    >>> is_number(0.1), is_number("0.1"), is_number(None), is_number(math.inf), is_number(True)
+    (True, False, False, False, False)
     """
+    if isinstance(value, bool | np.bool_):
+        return False
     try:
         return math.isfinite(value)  # type: ignore[arg-type]
     except (TypeError, OverflowError):
@@ -70,14 +83,19 @@ def check_question(
         )
     if abs(position_m) > FURTHEST_M:
         raise PositioningError(f"the part cannot lie at {position_m:g} m; positions are in metres")
-    if abs(remaining_m) > FURTHEST_M:
+    target_m, length_m = position_m + remaining_m, high - low
+    if max(low - target_m, target_m - high) > length_m or (
+        math.isinf(length_m) and abs(remaining_m) >= LONGEST_WAY_M
+    ):
+        way_out = meant_in(abs(remaining_m), {"mm": 1e-3, "µm": 1e-6}, (1e-5, min(length_m, USUAL_WAY_M)))
         raise PositioningError(
             f"the part cannot lie {abs(remaining_m):g} m from its target; distances are in metres"
+            + (way_out and f": {way_out}")
         )
 
 
 def check_observation(tap: Tap, moved_m: float, mass_kg: float, slowing_m_s2: float) -> None:
-    """Refuse to learn from what is no tap, or from what no part does; see `TapPlanner.observe`.
+    """Refuse to learn from what no part does; see `TapPlanner.observe`.
 
     `slowing_m_s2` is about what friction slows the part by.
 
@@ -85,7 +103,6 @@ def check_observation(tap: Tap, moved_m: float, mass_kg: float, slowing_m_s2: fl
     ------
     PositioningError
     """
-    check_is_tap(tap)
     if not (is_number(moved_m) and is_positive(mass_kg)):
         raise PositioningError(
             f"cannot learn from a displacement of {shown(moved_m)} m of {shown(mass_kg)} kg"
@@ -105,6 +122,47 @@ def check_observation(tap: Tap, moved_m: float, mass_kg: float, slowing_m_s2: fl
         )
 
 
+def check_is_made(
+    tap: Tap,
+    mass_kg: float,
+    max_velocity_m_s: float,
+    lightest_kg: float,
+    two_sided: bool,  # noqa: FBT001
+) -> None:
+    """Refuse to learn from a tap that no cell like this one makes; see `TapPlanner.observe`.
+
+    Limits may have been lowered since it was planned: what it may not pass are those of cells.
+
+    Raises
+    ------
+    PositioningError
+    """
+    check_is_tap(tap)
+    fastest = max(max_velocity_m_s, FASTEST_M_S)
+    if tap.velocity_m_s > fastest * (1.0 + ROUNDED):
+        way_out = meant_in(tap.velocity_m_s, {"mm/min": MM_PER_MIN, "mm/s": 1e-3}, (0.0, fastest))
+        raise PositioningError(
+            f"cannot learn from a tap at {tap.velocity_m_s:g} m/s, where none is faster than {fastest:g} m/s"
+            + (way_out and f"; {way_out}")
+        )
+    if LONGEST_M * (1.0 + ROUNDED) < tap.stroke_m < math.inf:
+        way_out = meant_in(tap.stroke_m, {"mm": 1e-3, "µm": 1e-6}, (0.0, LONGEST_M))
+        raise PositioningError(
+            f"cannot learn from a tap with a stroke of {tap.stroke_m:g} m, where none is longer than "
+            f"{LONGEST_M:g} m" + (way_out and f"; {way_out}")
+        )
+    if tap.direction < 0 and not two_sided:
+        raise PositioningError(
+            "cannot learn from a tap in direction -1: this cell strikes from one side only; with actuators "
+            "on both ends, give two_sided=True"
+        )
+    if is_positive(mass_kg) and mass_kg < lightest_kg:
+        raise PositioningError(
+            f"cannot learn from a tap at {mass_kg:g} kg: below {lightest_kg:.2g} kg the damping of the "
+            "contact keeps a part from springing back; masses are in kg"
+        )
+
+
 def check_friction(mu_k: float, std: float) -> None:
     """Refuse what is no kinetic coefficient with its deviation; see `TapPlanner.observe_friction`.
 
@@ -116,6 +174,11 @@ def check_friction(mu_k: float, std: float) -> None:
         raise PositioningError(
             f"cannot use a friction of {shown(mu_k)} with a standard deviation of {shown(std)}: the one is a "
             "number above 0, the other one of 0 or more"
+        )
+    if std > LARGEST_FRICTION:
+        raise PositioningError(
+            f"cannot use a friction with a standard deviation of {std:g}: no surface has so much; leave out "
+            "what is not known"
         )
     if mu_k > LARGEST_FRICTION:
         raise PositioningError(

@@ -82,10 +82,45 @@ def test_a_position_far_beyond_the_travel_is_refused_and_one_just_beyond_it_is_n
     assert isinstance(planner.next_tap(-5e-3, 18.9, 41e-3), Tap)
 
 
-@pytest.mark.parametrize("remaining_m", [1e308, -1e6, 12.3, "0.01", None])
+@pytest.mark.parametrize("remaining_m", [1e308, -1e6, 12.3, 1.0, "0.01", None, True])
 def test_a_distance_that_no_cell_has_is_refused(remaining_m: float) -> None:
     with pytest.raises(PositioningError, match="metres"):
         TapPlanner(two_sided=True).next_tap(remaining_m, 18.9)
+
+
+@pytest.mark.parametrize(
+    ("travel_m", "position_m", "remaining_m", "told"),
+    [
+        ((-math.inf, math.inf), 0.0, 4.0, "cannot lie 4 m .* in metres: if that was meant in mm, give 0.004"),
+        ((-math.inf, math.inf), 0.0, 400.0, "cannot lie 400 m .* if that was meant in µm, give 0.0004"),
+        ((0.0, math.inf), 0.0, 1.0, "cannot lie 1 m .* meant in mm, give 0.001"),
+        ((0.0, 0.04), 0.036, 4.0, "cannot lie 4 m .* meant in mm, give 0.004"),
+        ((0.0, 0.04), 0.036, -0.1, "cannot lie 0.1 m from its target; distances are in metres: if"),
+    ],
+)
+def test_a_distance_in_mm_is_told_by_the_travel_or_without_one_from_a_metre_on(
+    travel_m: tuple[float, float], position_m: float, remaining_m: float, told: str
+) -> None:
+    """4 mm that were meant as 4.0 were answered by a full tap."""
+    planner = TapPlanner(tolerance_m=20e-6, travel_m=travel_m, two_sided=True)
+    with pytest.raises(PositioningError, match=told):
+        planner.next_tap(remaining_m, 18.9, position_m)
+
+
+def test_a_target_beyond_the_travel_but_not_far_beyond_is_out_of_reach_as_before() -> None:
+    planner = TapPlanner(tolerance_m=20e-6, travel_m=(0.0, 2.0))
+    assert planner.next_tap(0.041, 18.9, 1.96) == Unreachable("the target lies 1.000 mm beyond the travel")
+    assert isinstance(planner.next_tap(1.5, 18.9, 0.0), Tap)
+
+
+def test_true_is_no_number() -> None:
+    planner = TapPlanner()
+    with pytest.raises(PositioningError, match="mass of the part must be a positive number of kg, not True"):
+        planner.next_tap(0.004, True)
+    with pytest.raises(PositioningError, match="cannot learn from a displacement of True m"):
+        planner.observe(Tap(0.03, 0.5e-3), True, 18.9)
+    with pytest.raises(PositioningError, match="max_velocity_m_s must be positive, not True"):
+        TapPlanner(max_velocity_m_s=True)
 
 
 @pytest.mark.parametrize(
@@ -160,11 +195,12 @@ def test_a_travel_that_is_set_the_wrong_way_round_is_told_as_that() -> None:
         (("x", 0.1), "friction of 'x' with a standard deviation of 0.1"),
         ((None, 0.1), "friction of None"),
         ((0.19, None), "standard deviation of None"),
+        ((0.19, 1e300), "friction with a standard deviation of 1e+300: no surface"),
         ((19.0, 0.2), "friction of 19: no surface has it; if that was meant in %, give 0.19"),
     ],
 )
 def test_a_friction_that_is_none_is_told(friction: tuple[float, float], told: str) -> None:
-    with pytest.raises(PositioningError, match=f"^cannot use a .*{told}"):
+    with pytest.raises(PositioningError, match=f"^cannot use a .*{told.replace('+', '[+]')}"):
         TapPlanner().observe_friction(*friction)
 
 
@@ -193,7 +229,7 @@ def test_what_is_no_signature_no_tap_and_no_mass_is_told() -> None:
 def test_nothing_is_learned_from_a_displacement_that_no_tap_makes(
     tap: Tap, moved_m: float, told: str
 ) -> None:
-    planner = TapPlanner()
+    planner = TapPlanner(two_sided=True)
     before = planner.posterior
     with pytest.raises(PositioningError, match=f"^cannot learn from a .*{told}"):
         planner.observe(tap, moved_m, 18.9)
@@ -242,6 +278,13 @@ def test_a_plant_that_cannot_be_planned_with_is_told(plant: Plant | dict[str, fl
         (Tap(0.05, -1e-3), "stroke must be positive"),
         (Tap(0.05, 1e-3, 0), "must be 1 or -1"),
         (Tap(0.05, 1e-3, position_m=40.0), "positions are in metres"),
+        (Tap(3.0, 0.5e-3), "tap at 3 m/s, where none is faster than 1 m/s"),
+        (Tap(2000.0, 0.5e-3), "tap at 2000 m/s, .*; if that was meant in mm/min, give 0.0333"),
+        (
+            Tap(0.03, 1.0),
+            "stroke of 1 m, where none is longer than 0.1 m; if that was meant in mm, give 0.001",
+        ),
+        (Tap(0.03, 0.5e-3, -1), "direction -1: this cell strikes from one side only"),
     ],
 )
 def test_nothing_is_learned_from_what_is_no_tap(tap: Tap, told: str) -> None:
@@ -250,6 +293,24 @@ def test_nothing_is_learned_from_what_is_no_tap(tap: Tap, told: str) -> None:
     with pytest.raises(PositioningError, match=told):
         planner.observe(tap, 1e-3, 18.9)
     assert planner.posterior is before
+
+
+def test_nothing_is_learned_from_a_part_too_light_to_plan_for() -> None:
+    planner = TapPlanner()
+    before = planner.posterior
+    with pytest.raises(PositioningError, match=r"tap at 1e-09 kg: below 0.0052 kg the damping"):
+        planner.observe(Tap(0.05, 1e-3), 1e-3, 1e-9)
+    assert planner.posterior is before
+
+
+def test_a_tap_beyond_limits_that_were_lowered_meanwhile_is_learned_from() -> None:
+    """It was planned within those before; a faster cell learns from taps that others do not make."""
+    planner = TapPlanner(two_sided=True)
+    planner.max_velocity_m_s, planner.max_stroke_m = 0.02, 0.2e-3
+    planner.observe(Tap(0.03, 0.5e-3, -1), 0.3e-3, 18.9)
+    fast = TapPlanner(max_velocity_m_s=2.0)
+    fast.observe(Tap(2.0, 0.5e-3), 0.3, 18.9)
+    assert (planner.posterior.taps, fast.posterior.taps) == (1, 1)
 
 
 def test_a_planner_resumes_from_a_posterior_alone() -> None:

@@ -145,6 +145,20 @@ def test_every_reason_has_its_german(reason: str) -> None:
             "press-1: m:502 Gerät 1: keine Verbindung innerhalb von 1 s; das Teil kann gestoßen worden sein",
         ),
         ("in place; tap 3 moved nothing", "am Ziel; Stoß 3 hat nichts bewegt"),
+        (
+            (
+                "the part cannot lie 4.5 m from its target; distances are in metres: if that was meant "
+                "in mm, give 0.0045"
+            ),
+            (
+                "das Teil kann nicht 4,5 m von seinem Ziel liegen; Abstände werden in Metern angegeben: "
+                "waren mm gemeint, 0,0045 angeben"
+            ),
+        ),
+        (
+            "the part cannot lie 1e+06 m from its target; distances are in metres",
+            "das Teil kann nicht 1e+06 m von seinem Ziel liegen; Abstände werden in Metern angegeben",
+        ),
         ("what nobody has translated", "what nobody has translated"),
         ("", ""),
     ],
