@@ -10,8 +10,10 @@ from impactcell.positioning.safety_limits import largest_force
 from impactcell.records import Samples
 
 
-def force_needed(limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, place: Samples) -> float:
-    """Bound on the contact force (N) of the gentlest tap that moves the part; inf where none does.
+def force_needed(
+    limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, place: Samples, least_m: float
+) -> float:
+    """Bound on the contact force (N) of the gentlest tap that moves the part further; inf where none does.
 
     The limit of force is left aside; `part` and `place` as in
     `impactcell.positioning.displacement_quantiles.Scenarios`.
@@ -22,6 +24,6 @@ def force_needed(limits: PlannerLimits, posterior: PlannerPosterior, part: Sampl
         largest_force(velocity, stroke, plant, part[0], part[1])
         for velocity, displacements in zip(limits.velocities, moved, strict=True)
         for stroke, displacement in zip(lookahead.strokes, displacements, strict=True)
-        if displacement > 0.0
+        if displacement > least_m
     ]
     return min(forces, default=math.inf)

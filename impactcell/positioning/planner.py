@@ -257,6 +257,8 @@ class TapPlanner:
         action, least = choose_action(
             distance - cut, lookahead, limits, space, scenarios, None if math.isinf(room) else stays
         )
+        if action is None and lookahead.furthest_m < (least_m := least_step_m(self.position_noise_m)):
+            return unmoved(self._limits, self._posterior, part, place, least_m)
         if action is None:
             return overshooting(self._limits, distance, part, least, room)
         return tap_of(action, self._posterior, part, place)

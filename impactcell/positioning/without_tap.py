@@ -31,18 +31,20 @@ def stuck(distance_m: float, overshoot_probability: float) -> Unreachable:
     )
 
 
-def unmoved(limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, place: Samples) -> Unreachable:
-    """Of a part that no tap within the limits moves: which of them it is."""
+def unmoved(
+    limits: PlannerLimits, posterior: PlannerPosterior, part: Samples, place: Samples, least_m: float = 0.0
+) -> Unreachable:
+    """Of a part that no tap within the limits moves by more than `least_m`: which of them it is."""
     needed_n = math.inf
     if limits.max_force_n < math.inf:
-        needed_n = force_needed(limits, posterior, part, place)
-    if needed_n < math.inf:
+        needed_n = force_needed(limits, posterior, part, place, least_m)
+    if limits.max_force_n < needed_n < math.inf:
         return Unreachable(
             f"no tap within max_force_n, {limits.max_force_n:g} N, moves a part of {part[0]} kg "
             f"at friction {posterior.mu_k:.3f}; the gentlest that does may take {math.ceil(needed_n)} N"
         )
     return Unreachable(
-        f"no tap up to {limits.max_velocity_m_s} m/s and {limits.max_stroke_m * 1e3} mm "
+        f"no tap up to {limits.max_velocity_m_s:g} m/s and {limits.max_stroke_m * 1e3:g} mm "
         f"moves a part of {part[0]} kg at friction {posterior.mu_k:.3f}"
     )
 

@@ -369,3 +369,11 @@ def test_a_part_that_no_force_moves_within_velocity_and_stroke_is_not_blamed_on_
     answer = TapPlanner(max_velocity_m_s=0.01, max_stroke_m=0.05e-3, max_force_n=60.0).next_tap(5e-3, 60.0)
     assert isinstance(answer, Unreachable)
     assert answer.reason.startswith("no tap up to 0.01 m/s and 0.05 mm moves a part of 60.0 kg")
+
+
+@pytest.mark.parametrize("max_force_n", [math.inf, 600.0])
+def test_taps_that_move_nothing_to_be_seen_are_not_told_as_ones_that_overshoot(max_force_n: float) -> None:
+    """A stroke of 0.1 µm, meant as 0.1 mm: the safest tap overshot with 1."""
+    answer = TapPlanner(tolerance_m=20e-6, max_stroke_m=1e-7, max_force_n=max_force_n).next_tap(4e-3, 18.9)
+    assert isinstance(answer, Unreachable)
+    assert answer.reason.startswith("no tap up to 0.1 m/s and 0.0001 mm moves a part of 18.9 kg")
