@@ -61,6 +61,7 @@ class Authority:
                 serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
             )
         )
+        private.chmod(0o600)
         return certificate, private
 
 
@@ -90,4 +91,5 @@ def self_signed(
             serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.NoEncryption()
         )
     )
+    files[1].chmod(0o600)
     return files

@@ -90,7 +90,7 @@ def test_a_law_that_cancels_the_drive_is_none() -> None:
         curve = FittedFunction(*np.zeros((4, 2)))
         fall = FallOfGap(5.0, 1.0, 0.99, 0.9, 1.0, 1e-3)
         name = "law_of_friction_over_load"
-        return MachineLaw(name, (0.0, 1.0), curve, None, (), (), final, model, fall, None)
+        return MachineLaw(name, {"load": (0.0, 1.0)}, curve, None, (), (), final, model, fall, None)
 
     assert refusal_of(finding, law_with(0.5), 1) == ""
     refused = refusal_of(finding, law_with(0.01), 1)
@@ -120,7 +120,7 @@ def test_friction_that_saturates_is_found_over_the_speed(zero_is_free: bool) -> 
     assert any("explains nearly all that any function" in note for note in finding.notes) is not zero_is_free
     assert law.choice is not None
     assert law.choice.law is not None
-    speed = np.linspace(20.0, 0.95 * law.tested[1], 60)
+    speed = np.linspace(20.0, 0.95 * law.tested["speed"][1], 60)
     sizes = [law.model.value(column) for column in law.model.terms[-1].columns]
     parts = [item.values(speed, law.choice.law.reference) for item in law.choice.law.terms]
     found = sum((size * part for size, part in zip(sizes, parts, strict=True)), np.zeros(60))
