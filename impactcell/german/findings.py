@@ -88,7 +88,6 @@ GERMAN_TERMS: Final = {
     "friction_over_position": "Reibung über dem Ort",
     "force_over_position": "Kraft über dem Ort",
     "force_over_speed": "Kraft über der Geschwindigkeit",
-    "force_over_velocity_and_position": "Kraft über Geschwindigkeit und Ort",
 }
 """Terms and free forms of a machine that the library of effects does not have."""
 

@@ -22,10 +22,12 @@ import numpy as np
 from impactcell.numerics.jit import compiled
 from impactcell.records import Samples
 
+FEATURES = 14
+"""Number of weights."""
 (
     SLIDE, SLIDE_BY_SPEED, SLIDE_BY_MASS, POSITION, POSITION_BY_MASS, INDENTATION, INDENTATION_BY_MASS,
     INDENTATION_BY_SPEED, LOSS, DIRECTION, DRAG, BREAKAWAY, BREAKAWAY_BY_SPEED, SHORT_PUSH,
-) = range(14)  # fmt: skip
+) = range(FEATURES)  # fmt: skip
 """Weights, each a line of phi, psi, beta or xi.
 
 Of what slides by a share, by its speed and by its mass; of a friction that goes with the place, as a share of
@@ -33,8 +35,6 @@ friction and as a force of its own; of the indentation, by mass and by velocity;
 friction that is higher one way; of a resistance that grows with speed; of breakaway, by velocity, and of
 short pushes after it.
 """
-FEATURES = 14
-"""Number of weights."""
 LEARNED_STD = np.full(FEATURES, 0.012)
 """Of a weight after a handful of taps, for what is to be expected of the taps to come."""
 VELOCITY_M_S = 0.03

@@ -242,13 +242,12 @@ def run(cells: Sequence[CellConfig]) -> None:
 
 def _warn_of_exposed_files(cells: Sequence[CellConfig]) -> None:
     """Log once of each file that grants access and is open to others; cells may share them."""
-    told = {
-        remark.message: cell.fault(remark.message, ".".join(remark.place))
-        for cell in reversed(cells)
-        for remark in exposed_files(cell.settings)
-    }
-    for warning in reversed(told.values()):
-        log.warning("%s", warning)
+    told: set[str] = set()
+    for cell in cells:
+        for remark in exposed_files(cell.settings):
+            if remark.message not in told:
+                log.warning("%s", cell.fault(remark.message, ".".join(remark.place)))
+                told.add(remark.message)
 
 
 async def _until_signalled(service: Service) -> bool:

@@ -426,6 +426,7 @@ def test_a_swing_is_simulated_nearer_with_the_law_of_the_place_that_pushes(
         simulated.append(model)
         return simulate_held_out(finding, model)
 
+    monkeypatch.setattr(law_proof, "simulate_held_out", counted)
     monkeypatch.setattr(law_search, "simulate_held_out", counted)
     monkeypatch.setattr(simulation, "simulate_held_out", counted)
     finding = investigate_machine(pendulum(1e-3), PENDULUM)

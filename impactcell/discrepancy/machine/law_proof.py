@@ -4,9 +4,11 @@ from dataclasses import replace
 
 from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.evidence import FallOfGap
-from impactcell.discrepancy.machine.finding import FittedModel
+from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
 from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.open_loop_error import OpenLoopError
 from impactcell.discrepancy.machine.proof import fall_of_gap
+from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.trials import ChosenTerm
 
 WEIGHINGS = 2
@@ -34,3 +36,15 @@ def proved_form(
     _, settled = own.blocks()
     # What a stretch has of its own in a simulation goes by the base model, without and with the form alike.
     return replace(with_it, base=fits.base), fall_of_gap(held_out, without, with_it, seed, settled)
+
+
+def simulated_without(finding: MachineFinding, model: FittedModel) -> OpenLoopError:
+    """Error of the held-out simulation without a law that was found beside a model.
+
+    What else is fitted beside the law may not make its simulation look near: of that model and the final one
+    the nearer counts.
+    """
+    without = [simulate_held_out(finding, model)]
+    if model.base is not finding.base:
+        without.append(finding.simulated[-1])
+    return min(without, key=lambda error: error.rmse)

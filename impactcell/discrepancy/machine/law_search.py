@@ -4,7 +4,8 @@ A smooth spline is fitted in each place, as smooth as blocks that it was not fit
 where that helps block after block the one that helps most is condensed: near the spline the squared residuals
 are a quadratic function of its coefficients, functional forms are projected on it, and the best are fitted by
 themselves. Held-out blocks and the held-out simulation decide; where they do not confirm a place the next is
-tried, and the error of the test is shared among all that may be.
+tried, and the error of the test is shared among all that may be. Where records need no function in one place,
+what remains may be a smooth force of velocity and position (`smooth_law.py`).
 """
 
 from dataclasses import dataclass, replace
@@ -21,7 +22,7 @@ from impactcell.discrepancy.machine.free_splines import (
 from impactcell.discrepancy.machine.held_number import HeldNumber
 from impactcell.discrepancy.machine.held_numbers import NEARLY_ALL, does_as_well, fitted, numbers_held
 from impactcell.discrepancy.machine.law_forms import Forms, nearest_forms
-from impactcell.discrepancy.machine.law_proof import proved_form
+from impactcell.discrepancy.machine.law_proof import proved_form, simulated_without
 from impactcell.discrepancy.machine.law_refusal import (
     GIVES_ENERGY,
     NOT_IN_ONE_PLACE,
@@ -220,24 +221,18 @@ class _LookedAt:
         curve = spline_function(tangent, spline.penalty / variance, tested)
         simulated = None
         if chosen is not None and fall.is_real_among(tests):
-            # What else is fitted beside the law may not make its simulation look near.
-            without = [simulate_held_out(finding, model)]
-            if model.base is not finding.base:
-                without.append(finding.simulated[-1])
-            nearest = min(without, key=lambda error: error.rmse)
-            simulated = nearest, simulate_held_out(finding, law_model)
-        place = LAW_PREFIX + spline.form
+            simulated = simulated_without(finding, model), simulate_held_out(finding, law_model)
         return MachineLaw(
-            place,
-            {COVARIATES[spline.form]: tested},
-            curve,
-            chosen,
-            equivalents,
-            rivals,
-            model,
-            law_model,
-            fall,
-            simulated,
+            place=LAW_PREFIX + spline.form,
+            tested={COVARIATES[spline.form]: tested},
+            spline=curve,
+            choice=chosen,
+            equivalents=equivalents,
+            rival_places=rivals,
+            without=model,
+            model=law_model,
+            fall=fall,
+            simulated=simulated,
         )
 
 

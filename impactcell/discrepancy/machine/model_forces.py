@@ -88,16 +88,18 @@ def resistance(finding: MachineFinding, model: FittedModel) -> tuple[float, floa
         for chosen in model.terms:
             term = term_of(chosen.choice)
             column = np.full(moving.shape, record.covariates.get(chosen.choice.covariate, 0.0))
-            features = term.features(replace(motion, covariate=column), chosen.shape)
-            if chosen.choice.reach is not None:  # what turns with the motion takes energy, or gives it
-                other_way = replace(motion, velocity=-motion.velocity, covariate=column)
+            is_smooth = chosen.choice.reach is not None
+            if not (term.is_friction or term.nonnegative or is_smooth):
+                continue
+            state = replace(motion, covariate=column)
+            features = term.features(state, chosen.shape)
+            if is_smooth:  # what turns with the motion takes energy, or gives it
+                other_way = replace(state, velocity=-motion.velocity)
                 features = 0.5 * (features - term.features(other_way, chosen.shape))
-            if term.is_friction or term.nonnegative or chosen.choice.reach is not None:
-                sense = 1.0 if term.is_friction else -np.sign(motion.velocity)
-                against += sense * sum(
-                    model.value(name) * feature
-                    for name, feature in zip(chosen.columns, features, strict=True)
-                )
+            sense = 1.0 if term.is_friction else -np.sign(motion.velocity)
+            against += sense * sum(
+                model.value(name) * feature for name, feature in zip(chosen.columns, features, strict=True)
+            )
         if moving.any():
             least = min(least, float(against[moving].min()))
             largest = max(largest, float(against[moving].max()))

@@ -54,7 +54,6 @@ VALUES: Mapping[str, Callable[[MotionState], Samples]] = {
     "speed": lambda motion: np.abs(motion.velocity),
     "load": lambda motion: motion.load,
     "position": lambda motion: motion.position,
-    "velocity": lambda motion: motion.velocity,
 }
 """Values of each covariate in a motion."""
 Ranges = Mapping[str, tuple[float, float]]

@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.discrepancy.laws import BAND, DRAWN, FittedFunction
-from impactcell.discrepancy.machine.base_model import NumberPrior, TermChoice
+from impactcell.discrepancy.machine.base_model import NumberPrior, Reach, TermChoice
 from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding, MachineLaw
 from impactcell.discrepancy.machine.free_splines import information_of
+from impactcell.discrepancy.machine.law_proof import simulated_without
 from impactcell.discrepancy.machine.law_terms import SMOOTH_LAW
 from impactcell.discrepancy.machine.machine_fits import MachineFits
 from impactcell.discrepancy.machine.proof import fall_of_gap
 from impactcell.discrepancy.machine.regression import Blocks, fit_blocks, out_of_fold_losses
-from impactcell.discrepancy.machine.rival_forms import Ranges
 from impactcell.discrepancy.machine.simulation import simulate_held_out
 from impactcell.discrepancy.machine.smooth_force import reach_of
 from impactcell.discrepancy.machine.smooth_waves import spectrum, waves_at
@@ -43,7 +43,7 @@ class SmoothLaw:
 
     Attributes
     ----------
-    choice : TermChoice
+    reach : Reach
     training, held_out : Blocks
         With its columns.
     priors : mapping
@@ -52,11 +52,20 @@ class SmoothLaw:
         Fall of each training block's squared residual out of fold.
     """
 
-    choice: TermChoice
+    reach: Reach
     training: Blocks
     held_out: Blocks
     priors: Priors
     gains: Samples
+
+    @property
+    def term(self) -> ChosenTerm:
+        """The force as a term of a model."""
+        return _term(self.reach)
+
+
+def _term(reach: Reach) -> ChosenTerm:
+    return ChosenTerm(TermChoice(SMOOTH_LAW, reach=reach), 0.0)
 
 
 def smooth_law(
@@ -73,9 +82,10 @@ def smooth_law(
     before : ndarray, shape (b,)
         Squared residual of each training block out of fold, without the force.
     """
-    choice = TermChoice(SMOOTH_LAW, reach=reach_of(fits.scale.ranges))
-    waves = ChosenTerm(choice, 0.0).columns
-    training, held_out = fits.blocks(fits.rows_with((*own, choice), lambda *_: {}))
+    reach = reach_of(fits.scale.ranges)
+    term = _term(reach)
+    waves = term.columns
+    training, held_out = fits.blocks(fits.rows_with((*own, term.choice), lambda *_: {}))
     squares = np.diag(training.products.sum(axis=0))[training.places(waves)]
     trials = []
     for length, level in itertools.product(LENGTHS, LEVELS):
@@ -87,53 +97,42 @@ def smooth_law(
             **{wave: NumberPrior(0.0, std) for wave, std in zip(waves, stds, strict=True)},
         }
         losses = out_of_fold_losses(training, [*columns, *waves], priors, fits.nonnegative)
-        trials.append(SmoothLaw(choice, training, held_out, priors, before - losses))
+        trials.append(SmoothLaw(reach, training, held_out, priors, before - losses))
     return max(trials, key=lambda trial: float(trial.gains.sum()))
 
 
 def as_law(fits: MachineFits, finding: MachineFinding, model: FittedModel, smooth: SmoothLaw) -> MachineLaw:
     """Fit a smooth force beside a model, and hold it to what it was not fitted to."""
-    chosen = ChosenTerm(smooth.choice, 0.0)
-    columns = list(model.fit.columns)
-    without = replace(model, fit=fit_blocks(smooth.training, columns, fits.priors, fits.nonnegative))
-    fit = fit_blocks(smooth.training, [*columns, *chosen.columns], smooth.priors, fits.nonnegative)
-    with_it = replace(model, terms=(*model.terms, chosen), fit=fit)
-    ranges = fits.scale.ranges
-    speed = ranges["speed"][1]
-    slices = _slices(smooth, with_it, ranges)
-    simulated = [simulate_held_out(finding, without)]
-    if model.base is not finding.base:
-        simulated.append(finding.simulated[-1])
+    columns = [*model.fit.columns, *smooth.term.columns]
+    fit = fit_blocks(smooth.training, columns, smooth.priors, fits.nonnegative)
+    with_it = replace(model, terms=(*model.terms, smooth.term), fit=fit)
+    reach, slices = smooth.reach, _slices(smooth, with_it)
     return MachineLaw(
-        SMOOTH_LAW,
-        {"velocity": (-speed, speed), "position": ranges["position"]},
-        slices[len(slices) // 2][1],
-        None,
-        (),
-        (),
-        without,
-        with_it,
-        fall_of_gap(smooth.held_out, without, with_it, finding.seed),
-        (min(simulated, key=lambda error: error.rmse), simulate_held_out(finding, with_it)),
+        place=SMOOTH_LAW,
+        tested={"velocity": (-reach.speed, reach.speed), "position": reach.position},
+        spline=slices[len(slices) // 2][1],
+        choice=None,
+        equivalents=(),
+        rival_places=(),
+        without=model,
+        model=with_it,
+        fall=fall_of_gap(smooth.held_out, model, with_it, finding.seed),
+        simulated=(simulated_without(finding, model), simulate_held_out(finding, with_it)),
         slices=slices,
     )
 
 
-def _slices(
-    smooth: SmoothLaw, model: FittedModel, ranges: Ranges
-) -> tuple[tuple[float, FittedFunction], ...]:
+def _slices(smooth: SmoothLaw, model: FittedModel) -> tuple[tuple[float, FittedFunction], ...]:
     """Force over the velocity from place to place, with the 95 % band of it less its mean over all.
 
     The mean is what a constant force of the machine takes up.
     """
-    waves = ChosenTerm(smooth.choice, 0.0).columns
-    reach = reach_of(ranges)
+    waves, reach = smooth.term.columns, smooth.reach
     information, _, _ = information_of(smooth.training, model, waves, smooth.priors)
     stds = np.array([smooth.priors[wave].std for wave in waves])
     covariance = np.outer(stds, stds) * np.linalg.inv(np.outer(stds, stds) * information + np.eye(len(stds)))
-    low, high = ranges["position"]
     velocity = np.linspace(-reach.speed, reach.speed, DRAWN)
-    places = np.linspace(low, high, PLACES)
+    places = np.linspace(*reach.position, PLACES)
     basis = np.stack([waves_at(np.full(DRAWN, place), velocity, reach).T for place in places])
     moving = basis - basis.mean(axis=(0, 1))
     value = basis @ np.array([model.value(wave) for wave in waves])
