@@ -32,7 +32,7 @@ from impactcell.discrepancy.machine.remainder import remainder_of
 from impactcell.discrepancy.machine.selection import SelectionStep, select_terms
 from impactcell.discrepancy.machine.shape_ends import with_ends_named
 from impactcell.discrepancy.machine.shape_intervals import with_shape_intervals
-from impactcell.discrepancy.machine.ties import still_tied
+from impactcell.discrepancy.machine.ties import needed_as_much, still_tied
 from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch
 from impactcell.discrepancy.machine.weak_form import Column
 
@@ -109,7 +109,8 @@ def establish(
     models, falls = proof.models, proof.falls
     training, held_out = fits.blocks()
     if falls:
-        steps = _with_ties_of_now(_search(fits, training, candidates), fits.columns(base_terms), steps)
+        now = replace(_search(fits, training, candidates), smooth_force=fits.smooth_force(candidates))
+        steps = _with_ties_of_now(now, fits.columns(base_terms), steps)
         notes = [*notes, *absent_gravity_notes(steps)]
     nominal, final = models[0], models[-1]
     settled = training, held_out
@@ -202,9 +203,10 @@ def _with_ties_of_now(
     told = []
     for step in steps:
         best, tied = step.accepted, step.tied_with
-        if best is not None and tied:
+        if best is not None:
             numbers = [name for name in tied if name not in search.shapes]
-            tied = (*still_tied(search, columns, best, tied), *numbers)
+            tied = still_tied(search, columns, best, tied) if tied else ()
+            tied = (*dict.fromkeys((*tied, *needed_as_much(search, columns, best))), *numbers)
         told.append(replace(step, tied_with=tied))
         columns = [*columns, *(best.term.columns if best is not None else ())]
     return told

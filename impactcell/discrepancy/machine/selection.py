@@ -18,7 +18,7 @@ from impactcell.discrepancy.machine.needs import (
     needs_of_terms,
 )
 from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, PLACES
-from impactcell.discrepancy.machine.ties import is_tied, tied_terms
+from impactcell.discrepancy.machine.ties import MIN_SHARE_OF_NEEDED, is_tied, tied_terms
 from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch, Trial, mean_over_error
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.discrepancy.search import MAX_EXPECTED_GAP
@@ -34,8 +34,6 @@ MIN_SHARE_OF_ALL = 0.5
 MIN_SHARE_OF_FREE = 0.8
 """Share of what a free form in the same place closes, and of how much records need it, that a named term has
 to have [1]."""
-MIN_SHARE_OF_NEEDED = 0.5
-"""Share of what a term that records need closes, that another one has to close to take its place [1]."""
 MAX_TERMS = 2
 """Terms that one run takes, the second only if nothing is left then: any other is likelier to be a patch on
 what the catalogue lacks [1]."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from impactcell.discrepancy.machine.needs import MIN_NEED, TIED_NEED, needs_of_terms
 from impactcell.discrepancy.machine.trials import TermSearch, Trial, mean_over_error
 from impactcell.discrepancy.machine.weak_form import Column
 from impactcell.discrepancy.search import MAX_EXPECTED_GAP
@@ -15,6 +16,8 @@ EQUAL_SHARE = 0.97
 """Share of the best term's gain from which on another one is tied whatever the scatter [1]."""
 TOLD_GAP = 2.0
 """Noise floors from which on a term that leaves as much is no equal of one that leaves nothing [1]."""
+MIN_SHARE_OF_NEEDED = 0.5
+"""Share of what a term closes, that another one has to close to take its place or to be tied with it [1]."""
 
 
 def tied_terms(search: TermSearch, before: Samples, best: Trial, others: Sequence[Trial]) -> tuple[str, ...]:
@@ -36,6 +39,28 @@ def still_tied(
     choices = [choice for choice in search.candidates if choice.name in names]
     now = search.best_shape(best.term.choice, columns, before)
     return tied_terms(search, before, now, [search.best_shape(one, columns, before) for one in choices])
+
+
+def needed_as_much(search: TermSearch, columns: Sequence[Column], best: Trial) -> tuple[str, ...]:
+    """Names of the terms that records need as much as the best one, beside a smooth force.
+
+    What blocks lose with each hangs on what remains: beside a model error two terms that a smooth force turns
+    into one another are told apart by it falsely.
+    """
+    if search.smooth_force is None:
+        return ()
+    before = search.losses(columns)
+    needs = needs_of_terms(search.smooth_force.beside(columns), search.candidates, search.shapes)
+    choice = best.term.choice
+    now = search.best_shape(choice, columns, before)
+    least = max(needs[choice.name][0] - TIED_NEED, MIN_NEED)
+    wanted = [one for one in search.candidates if one != choice and needs[one.name][0] > least]
+    rivals = [search.best_shape(one, columns, before) for one in wanted]
+    return tuple(
+        rival.term.choice.name
+        for rival in rivals
+        if rival.gain >= MIN_SHARE_OF_NEEDED * now.gain and not rival.at_end
+    )
 
 
 def is_tied(best: Trial, rival: Trial) -> bool:
