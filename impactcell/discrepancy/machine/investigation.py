@@ -75,8 +75,7 @@ def investigate_machine(
     if slip is not None:
         return told_of_slip(fits, finding, slip, notes)
     finding = with_experiments(fits, with_degrees_asked_for(with_law(fits, finding)))
-    finding = with_tied_models(fits, with_clear_strengths(fits, finding))
-    return with_closing_notes(fits, finding)
+    return with_closing_notes(fits, with_clear_strengths(fits, finding))
 
 
 def _fits_of(
@@ -124,7 +123,7 @@ def _established(fits: MachineFits, notes: list[str], seed: int) -> MachineFindi
         before, after = finding.simulated
         follows = finding.is_at_floor or after.fit_percent > 0.0
         if not finding.established or (after.rmse <= MAX_RISE * before.rmse and follows):
-            return replace(finding, notes=(*finding.notes, *said))
+            return with_tied_models(fits, replace(finding, notes=(*finding.notes, *said)))
         last = finding.established[-1]
         contradicted |= {last}
         constant = after.rmse / (1.0 - after.fit_percent / 100.0)
