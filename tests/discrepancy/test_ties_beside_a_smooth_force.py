@@ -36,9 +36,15 @@ class Search(TermSearch):
     gains: Mapping[str, float] = None  # type: ignore[assignment]
     ends: frozenset[str] = frozenset()
 
+    left: float = 1.1
+
     def losses(self, columns: Sequence[Column]) -> Samples:
         assert list(columns) == MODEL
         return np.ones(8)
+
+    def gap(self, columns: Sequence[Column]) -> float:
+        assert list(columns) == [*MODEL, ("quadratic_drag", 0.0, 0)]
+        return self.left
 
     def best_shape(self, choice: TermChoice, columns: Sequence[Column], before: Samples) -> Trial:
         gains = np.full(8, self.gains[choice.name] / 8)
@@ -46,7 +52,7 @@ class Search(TermSearch):
 
 
 def tied_with_drag(
-    needs: Sequence[float], gains: Sequence[float], ends: frozenset[str] = frozenset()
+    needs: Sequence[float], gains: Sequence[float], ends: frozenset[str] = frozenset(), left: float = 1.1
 ) -> tuple[str, ...]:
     choices = DRAG, VISCOUS, SPRING
     names = [choice.name for choice in choices]
@@ -59,6 +65,7 @@ def tied_with_drag(
         Needs(dict(zip(names, needs, strict=True))),  # type: ignore[arg-type]
         dict(zip(names, gains, strict=True)),
         ends,
+        left,
     )
     best = Trial(ChosenTerm(DRAG, 0.0), np.ones(8), np.ones(8), at_end=False)
     return needed_as_much(search, MODEL, best)
@@ -83,6 +90,10 @@ def test_a_term_is_tied_that_records_need_as_much(
 
 def test_a_shape_at_its_end_is_not_tied() -> None:
     assert tied_with_drag((9.0, 9.0, -1.0), (1.0, 1.0, 0.0), frozenset({"viscous_friction"})) == ()
+
+
+def test_where_no_more_than_the_noise_is_left_blocks_tell() -> None:
+    assert tied_with_drag((9.0, 9.0, -1.0), (1.0, 0.9, 0.0), left=1.0) == ()
 
 
 @pytest.mark.slow

@@ -45,9 +45,9 @@ def needed_as_much(search: TermSearch, columns: Sequence[Column], best: Trial) -
     """Names of the terms that records need as much as the best one, beside a smooth force.
 
     What blocks lose with each hangs on what remains: beside a model error two terms that a smooth force turns
-    into one another are told apart by it falsely.
+    into one another are told apart by it falsely. Where the best one leaves but the noise, they tell.
     """
-    if search.smooth_force is None:
+    if search.smooth_force is None or search.gap([*columns, *best.term.columns]) <= 1.0:
         return ()
     before = search.losses(columns)
     needs = needs_of_terms(search.smooth_force.beside(columns), search.candidates, search.shapes)
