@@ -68,13 +68,19 @@ def demo(
 @verb(app)
 def run(cells: Cells) -> None:
     """Run the service; SIGTERM ends it cleanly, SIGHUP reloads what can be reloaded."""
+    from impactcell.process.signals import told_when_ended
+    from impactcell.process.stopping import STOPPED_EARLY
+
     gc.disable()  # until it has started: what is loaded and built by then stays, and is much to look through
     try:
-        from impactcell.service import run as run_service
-        from impactcell.settings import read_cells
+        with told_when_ended(lambda: logging.getLogger("impactcell.service").info(STOPPED_EARLY)):
+            from impactcell.service import run as run_service
+            from impactcell.settings import read_cells
 
-        run_service(read_cells(cells))
+            cells_read = read_cells(cells)
+        run_service(cells_read)
     finally:
+        gc.freeze()  # the interpreter's end would look through everything once more, for a second or three
         gc.enable()
 
 

@@ -5,7 +5,9 @@ import contextlib
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+
+from impactcell.process.exit_codes import ExitCode
 
 
 def ends_of_terminal() -> tuple[signal.Signals, ...]:
@@ -31,6 +33,28 @@ def stop_on_signals(stop: asyncio.Event, *others: signal.Signals) -> Iterator[li
     finally:
         for number, handler in before.items():
             loop.remove_signal_handler(number)
+            signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def told_when_ended(say: Callable[[], object]) -> Iterator[None]:
+    """Have SIGTERM and Ctrl-C end the program inside, with the exit code of each; `say` says so.
+
+    For what comes before any event loop runs, and has opened nothing. A KeyboardInterrupt would not do: where
+    one passes through a library's own start, Python ends as killed by the signal, whoever catches it.
+    """
+    codes = {signal.SIGTERM: ExitCode.DONE, signal.SIGINT: ExitCode.INTERRUPTED}
+    before = {number: signal.getsignal(number) for number in codes}
+    for number in codes:
+        if before[number] is not signal.SIG_IGN:
+            signal.signal(number, lambda number, _: sys.exit(codes[signal.Signals(number)]))
+    try:
+        yield
+    except SystemExit:
+        say()
+        raise
+    finally:
+        for number, handler in before.items():
             signal.signal(number, handler)
 
 

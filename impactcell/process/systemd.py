@@ -1,5 +1,6 @@
 """The service manager's protocol: readiness, watchdog and stopping, as in sd_notify(3)."""
 
+import asyncio
 import logging
 import os
 import socket
@@ -37,3 +38,11 @@ def watchdog_interval_s() -> float | None:
     microseconds = os.environ.get("WATCHDOG_USEC", "")
     for_us = os.environ.get("WATCHDOG_PID", str(os.getpid())) == str(os.getpid())
     return int(microseconds) / 2e6 if microseconds.isdigit() and int(microseconds) > 0 and for_us else None
+
+
+async def keep_watchdog_quiet() -> None:
+    """Tell the service manager, where it wants to know, that the event loop is alive; until cancelled."""
+    interval_s = watchdog_interval_s()
+    while interval_s is not None:
+        notify("WATCHDOG=1")
+        await asyncio.sleep(interval_s)

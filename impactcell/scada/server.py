@@ -20,6 +20,7 @@ from impactcell.opcua.host_interface import Actor, Host, Permission, Product, Re
 from impactcell.opcua.node_references import link
 from impactcell.opcua.service_host import ServiceHost, aggregate_functions
 from impactcell.opcua.variable_store import VariableStore
+from impactcell.process.stopping import whole
 from impactcell.quantities import HISTORY
 from impactcell.records import Alarm, ModuleStatus, Snapshot
 from impactcell.scada.access_policy import CellAccess
@@ -118,7 +119,11 @@ class Server:
             )
         with _uncollected():
             host = await self._built(users)
-        await host.start()
+        try:
+            await whole(host.start())
+        except BaseException:
+            await host.stop()
+            raise
         self._host = host
         return self
 

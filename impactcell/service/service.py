@@ -8,6 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from functools import partial
 
 from impactcell import cell as core
 from impactcell.alarms.rules import journal_fault
@@ -18,6 +19,7 @@ from impactcell.opcua.large_requests import leave_full_rounds_to_the_server
 from impactcell.process import log_lines, systemd
 from impactcell.process.cell_logger import CellLogger
 from impactcell.process.signals import stop_on_signals
+from impactcell.process.stopping import STOPPED_EARLY, in_passing_thread, unless_stopped, whole
 from impactcell.scada import Server
 from impactcell.service.cell_task import CellTask, SnapshotCallback
 from impactcell.service.factory import (
@@ -30,6 +32,7 @@ from impactcell.service.history_source import JournalHistory
 from impactcell.service.monitoring import CellHealth, Monitoring, waiting_cell
 from impactcell.service.operator_commands import OperatorCommands
 from impactcell.service.page_servers import served_pages
+from impactcell.service.warmup import load_planners
 from impactcell.settings import CellConfig
 from impactcell.settings.exposed_files import exposed_files
 from impactcell.web import CellNews, TourStop
@@ -82,6 +85,7 @@ class Service:
         self.pages: dict[str, str] = {}
         """Address of the page that each cell is on, if any, once `run` has started."""
         self._feeds: dict[str, LiveFeed] = {}
+        self._has_started = asyncio.Event()
         shared = Transports(map(module_link, cells))
         self._transports = {cell.name: shared.transport_for(module_link(cell)) for cell in cells}
 
@@ -93,33 +97,16 @@ class Service:
         UnstoredError
             Journals could not take all at the end.
         """
-        self._create_tasks()
+        tasks: list[asyncio.Task[None]] = []
         async with contextlib.AsyncExitStack() as stack:
-            await stack.enter_async_context(self._monitoring())
-            history = JournalHistory(self.running)
-            stack.push_async_callback(history.close)
-            servers = {}
-            for endpoint in dict.fromkeys(cell.settings.opcua.endpoint for cell in self._cells):
-                server, cell = self._server(endpoint, history)
-                with cell.told_at("opcua.endpoint"):
-                    servers[endpoint] = await stack.enter_async_context(server)
-            shown_by = {cell.name: servers[cell.settings.opcua.endpoint] for cell in self._cells}
-            self.endpoints |= {name: server.endpoint for name, server in shown_by.items()}
-            pages = await stack.enter_async_context(
-                served_pages(self._cells, shown_by, OperatorCommands(self.running), self._tours)
-            )
-            self.pages |= {name: page.endpoint for name, page in pages.items()}
-            self._feeds |= {name: page.feed for name, page in pages.items()}
-            tasks = [
-                asyncio.create_task(self._keep_running(cell, shown_by[cell.name]), name=cell.name)
-                for cell in self._cells
-            ]
-            tasks.append(asyncio.create_task(_watchdog(), name="watchdog"))
-            systemd.notify("READY=1")
-            if started is not None:
-                started()
             try:
-                await stop.wait()
+                if await unless_stopped(self._start(stack, tasks), stop):
+                    self._has_started.set()
+                    if started is not None:
+                        started()
+                    await stop.wait()
+                else:
+                    log.info(STOPPED_EARLY)
             finally:
                 systemd.notify("STOPPING=1")
                 for task in tasks:
@@ -129,24 +116,59 @@ class Service:
         if sum(lost):
             raise UnstoredError(f"entries that no journal could take: {sum(lost)}; the log says why")
 
-    def _create_tasks(self) -> None:
+    async def _start(self, stack: contextlib.AsyncExitStack, tasks: list[asyncio.Task[None]]) -> None:
+        """Make the cells, and all that shows them, to be left by `stack`; and begin `tasks`."""
+        await in_passing_thread(partial(load_planners, self._cells))
+        await self._make_cells()
+        await stack.enter_async_context(self._monitoring())
+        history = JournalHistory(self.running)
+        stack.push_async_callback(history.close)
+        servers = {}
+        for endpoint in dict.fromkeys(cell.settings.opcua.endpoint for cell in self._cells):
+            server, cell = self._server(endpoint, history)
+            with cell.told_at("opcua.endpoint"):
+                servers[endpoint] = await stack.enter_async_context(server)
+        shown_by = {cell.name: servers[cell.settings.opcua.endpoint] for cell in self._cells}
+        self.endpoints |= {name: server.endpoint for name, server in shown_by.items()}
+        pages = await whole(
+            stack.enter_async_context(
+                served_pages(self._cells, shown_by, OperatorCommands(self.running), self._tours)
+            )
+        )
+        self.pages |= {name: page.endpoint for name, page in pages.items()}
+        self._feeds |= {name: page.feed for name, page in pages.items()}
+        tasks += [
+            asyncio.create_task(self._keep_running(cell, shown_by[cell.name]), name=cell.name)
+            for cell in self._cells
+        ]
+        tasks.append(asyncio.create_task(systemd.keep_watchdog_quiet(), name="watchdog"))
+        systemd.notify("READY=1")
+
+    async def _make_cells(self) -> None:
         """Make every cell that can run."""
         faults: dict[str, JournalError] = {}
         for cell in self._cells:
             try:
-                self.running[cell.name] = CellTask(cell, self._on_snapshot, self._transports[cell.name])
+                await whole(self._make(cell))
             except JournalError as error:
                 faults[cell.fault(f"journal.file: {error}", "journal.file")] = error
         if faults and not self.running and not any(fault.retry for fault in faults.values()):
             is_foreign = all(isinstance(fault, ForeignJournalError) for fault in faults.values())
             raise (ForeignJournalError if is_foreign else JournalError)("\n".join(faults))
 
+    async def _make(self, cell: CellConfig) -> None:
+        """Make a cell, in a thread: a disk may take its time, and the others go on."""
+        self.running[cell.name] = await asyncio.to_thread(
+            CellTask, cell, self._on_snapshot, self._transports[cell.name]
+        )
+
     def _health(self) -> list[CellHealth]:
         cells = [(cell.name, self.running.get(cell.name)) for cell in self._cells]
         return [waiting_cell(name) if running is None else running.health for name, running in cells]
 
     async def reload(self) -> None:
-        """Read every cell's files again; see `CellTask.reload`."""
+        """Read every cell's files again, once all have started; see `CellTask.reload`."""
+        await self._has_started.wait()
         systemd.notify(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
         for running in tuple(self.running.values()):
             await running.reload()
@@ -197,17 +219,9 @@ class Service:
         """Make a cell as soon as its journal can be opened; each reason why it cannot is told once."""
         reason, again_s = "", AGAIN_S
         while True:
-            # In a thread: a disk may take its time, and the others go on.
-            opening = asyncio.create_task(
-                asyncio.to_thread(CellTask, cell, self._on_snapshot, self._transports[cell.name])
-            )
             try:
-                self.running[cell.name] = await asyncio.shield(opening)
+                await whole(self._make(cell))
                 return await self.running[cell.name].reload()  # its files may be others by now
-            except asyncio.CancelledError:
-                with contextlib.suppress(JournalError):
-                    self.running[cell.name] = await opening  # to be closed
-                raise
             except JournalError as error:
                 if str(error) != reason:
                     reason = str(error)
@@ -232,11 +246,7 @@ def run(cells: Sequence[CellConfig]) -> None:
     on_compilation(lambda: log.info(COMPILING))
     _warn_of_exposed_files(cells)
     sys.setswitchinterval(SWITCH_S)
-    try:
-        interrupted = asyncio.run(_until_signalled(Service(cells)))
-    finally:
-        gc.freeze()  # the interpreter's end would look through everything once more, for most of a second
-    if interrupted:
+    if asyncio.run(_until_signalled(Service(cells))):
         raise KeyboardInterrupt
 
 
@@ -282,10 +292,3 @@ def _tell_fault(cell: CellConfig, server: Server, feed: LiveFeed | None, reason:
         server.alarm(cell.name, alarm)
         if feed is not None:
             feed.put(CellNews(cell.name, alarms=(alarm,)))
-
-
-async def _watchdog() -> None:
-    interval_s = systemd.watchdog_interval_s()
-    while interval_s is not None:
-        systemd.notify("WATCHDOG=1")
-        await asyncio.sleep(interval_s)

@@ -6,7 +6,7 @@ new machine it takes ten seconds, in which the cycle that needs it would wait.
 
 import gc
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,8 @@ from impactcell.cell import CellDesign
 from impactcell.journal.capture_codec import encode_capture
 from impactcell.physics import TapInput, simulate_tap
 from impactcell.records import Capture, Channel, PositioningState, uniform_times
+from impactcell.service.factory import cell_design, positioning_cell, tap_planner
+from impactcell.settings import CellConfig
 from impactcell.tracking import wear_batch
 from impactcell.tracking.wear_batch import FrictionObservation, TrackerSettings, TrackerState
 
@@ -35,6 +37,19 @@ ANNOUNCED, OUTLIER = 300, 30
 
 _lock, _changes_lock = threading.Lock(), threading.Lock()
 _warm: set[tuple[object, ...]] = set()
+
+
+def load_planners(cells: Iterable[CellConfig]) -> None:
+    """Make the planner of each cell that positions, and forget it: its code is compiled or loaded then.
+
+    Raises
+    ------
+    PositioningError
+        A limit of a cell is one that no cell has.
+    """
+    for cell in cells:
+        if cell.settings.positioning is not None:
+            tap_planner(cell, positioning_cell(cell), cell_design(cell), cell.register_map)
 
 
 def warm_up(design: CellDesign, stop: Callable[[], bool] = lambda: False) -> None:
