@@ -5,7 +5,7 @@ from typing import Annotated, Final, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from impactcell.process import yaml_loader
+from impactcell.process import yaml_schema
 
 
 class ScenarioModel(BaseModel):
@@ -33,5 +33,5 @@ def load(file: Path, model: type[M]) -> M:
     SettingsError
         Every fault at once, as `file:line:column: key.path: message`.
     """
-    scenario, _ = yaml_loader.read(file, model)
+    scenario, _ = yaml_schema.read(file, model)
     return scenario

@@ -6,31 +6,28 @@ PyYAML alone follows 1.1, where each of these surprises.
 
 import difflib
 import itertools
-import types
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, TypeVar, Union, get_args, get_origin
+from typing import Final
 
 import yaml
-from pydantic import BaseModel, ValidationError
-from pydantic_core import ErrorDetails
 
 from impactcell.errors import SettingsError
-from impactcell.process.file_format import newer_format
-from impactcell.process.written_numbers import DECIMAL_POINT, number_meant
 from impactcell.process.yaml_core_schema import CoreLoader, integer
 
 Location = tuple[str | int, ...]
-M = TypeVar("M", bound=BaseModel)
 
 MOST_BYTES = 10_000_000
 """Of one file; a map of every register there can be has 6 MB."""
 MOST_NODES = 200_000
 """A file of nested aliases or merges can describe more than memory holds; no honest one comes near this."""
 
+
+NULL: Final = "tag:yaml.org,2002:null"
+"""What an empty value is read as."""
 
 _WAYS_OUT: Final = {
     "found character '\\t' that cannot start any token": "a tab; YAML is indented with spaces",
@@ -57,10 +54,18 @@ class FilePosition:
 
 @dataclass(frozen=True, slots=True)
 class Positions:
-    """Where each key and each value of a YAML file stands, by its path of keys and indices."""
+    """Where each key and each value of a YAML file stands, by its path of keys and indices.
+
+    Attributes
+    ----------
+    keys, values : mapping
+    empty : frozenset
+        Keys with nothing after them, which YAML reads as null; not those with `null` or `~`.
+    """
 
     keys: Mapping[Location, FilePosition]
     values: Mapping[Location, FilePosition]
+    empty: frozenset[Location] = frozenset()
 
     def existing_path(self, location: Sequence[str | int]) -> Location:
         """Give the part of `location` that the file has, leaving out tags that only a schema knows."""
@@ -139,6 +144,7 @@ def _end_of(text: str) -> FilePosition:
 def _positions(path: Path, root: yaml.Node) -> Positions:
     keys: dict[Location, FilePosition] = {}
     values: dict[Location, FilePosition] = {}
+    is_empty: dict[Location, bool] = {}
     visits = itertools.count(1)
 
     def visit(node: yaml.Node, location: Location, above: tuple[yaml.Node, ...]) -> None:
@@ -147,7 +153,7 @@ def _positions(path: Path, root: yaml.Node) -> Positions:
             raise SettingsError(f"{path}:{place}: this part of the file contains itself")
         values[location] = place
         if isinstance(node, yaml.ScalarNode):
-            _check_characters(path, place, _dotted(location), node.value)
+            _check_characters(path, place, dotted(location), node.value)
         if next(visits) > MOST_NODES:
             raise SettingsError(f"{path}:{place}: aliases describe more than {MOST_NODES} values")
         within = (*above, node)
@@ -168,11 +174,12 @@ def _positions(path: Path, root: yaml.Node) -> Positions:
                             key = integer(key_node.value)
                     here = (*location, key)
                     keys[here] = FilePosition(key_node.start_mark.line + 1, key_node.start_mark.column + 1)
-                    _check_characters(path, keys[here], _dotted(location), key_node.value)
+                    _check_characters(path, keys[here], dotted(location), key_node.value)
+                    is_empty[here] = value_node.tag == NULL and value_node.start_mark == value_node.end_mark
                     visit(value_node, here, within)
 
     visit(root, (), ())
-    return Positions(keys, values)
+    return Positions(keys, values, frozenset(here for here, empty in is_empty.items() if empty))
 
 
 def _check_characters(path: Path, place: FilePosition, name: str, text: str) -> None:
@@ -183,21 +190,6 @@ def _check_characters(path: Path, place: FilePosition, name: str, text: str) -> 
                 f"has the character U+{ord(character):04X}, which no name, path or text has; take it out"
             )
             raise SettingsError(format_error(path, place, f"{name}: {message}" if name else message))
-
-
-def read(path: Path, schema: type[M]) -> tuple[M, Positions]:
-    """Read a file into a pydantic model; validators find the file's directory in their context.
-
-    Raises
-    ------
-    SettingsError
-        With every fault of the file, one `file:line:column: message` a line.
-    """
-    data, positions = load(path)
-    try:
-        return schema.model_validate(data, context={"directory": path.parent}), positions
-    except ValidationError as error:
-        raise SettingsError("\n".join(format_errors(path, positions, error, schema))) from error
 
 
 def format_error(path: Path, place: FilePosition, message: str) -> str:
@@ -212,86 +204,9 @@ def suggest(name: str, allowed: Iterable[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else f"allowed here: {', '.join(names)}"
 
 
-def format_errors(
-    path: Path, positions: Positions, error: ValidationError, schema: type[BaseModel]
-) -> list[str]:
-    """Turn a pydantic error into `file:line:column: message`, in the order of the file, each once."""
-    files = {
-        (place.line, place.column, format_error(path, place, message))
-        for place, message in (
-            _explain(details, positions, schema) for details in error.errors(include_url=False)
-        )
-    }
-    return [text for _, _, text in sorted(files)]
-
-
-def _explain(
-    details: ErrorDetails, positions: Positions, schema: type[BaseModel]
-) -> tuple[FilePosition, str]:
-    location = tuple(details["loc"])
-    kind = details["type"]
-    if kind == "extra_forbidden":
-        name = str(location[-1])
-        hint = suggest(name, _allowed(schema, location[:-1]))
-        return positions.key(location), f"unknown key {_dotted(location)!r}; {hint}"
-    if kind == "missing":
-        return positions.key(
-            location[:-1]
-        ), f"{_dotted((*positions.existing_path(location), location[-1]))!r} is missing"
-    text = details["msg"].removeprefix("Value error, ").removeprefix("Input ")
-    name = _dotted(positions.existing_path(location))
-    input_value = details.get("input")
-    if kind == "invalid_key" and isinstance(input_value, int):
-        return positions.value(location), f"{name}: {input_value} stands where a key should; {DECIMAL_POINT}"
-    if kind in ("model_type", "dict_type"):
-        text = "should be keys with values (`key: value`)"
-        text += ", not a list" if isinstance(input_value, list) else ""
-    if kind != "value_error" and isinstance(input_value, str | int | float | bool | None):
-        text += f", not {'empty' if input_value is None else repr(input_value)}"
-    if location == ("format",) and (way_out := newer_format(input_value)):
-        text += f"; {way_out}"
-    if kind.startswith(("int", "float")) and (meant := number_meant(input_value)):
-        text += f"; {meant}"
-    return positions.value(location), f"{name}: {text}" if name else text
-
-
-def _dotted(location: Sequence[str | int]) -> str:
+def dotted(location: Sequence[str | int]) -> str:
+    """Write a path of keys and indices as people do, as in `sensors.force[2]`."""
     text = ""
     for part in location:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else part
     return text
-
-
-def _allowed(schema: type[BaseModel], location: Sequence[str | int]) -> list[str]:
-    """Names of the fields that a mapping at `location` may have."""
-    types_here: list[object] = [schema]
-    for part in location:
-        below = [inner for here in types_here for inner in _below(here, part)]
-        types_here = below or types_here
-    models = [here for here in types_here if isinstance(here, type) and issubclass(here, BaseModel)]
-    return sorted({field.alias or name for model in models for name, field in model.model_fields.items()})
-
-
-def _below(annotation: object, part: str | int) -> list[object]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [
-            inner
-            for name, field in annotation.model_fields.items()
-            if part in (name, field.alias)
-            for inner in _alternatives(field.annotation)
-        ]
-    if get_origin(annotation) is not None:
-        return [inner for argument in get_args(annotation)[-1:] for inner in _alternatives(argument)]
-    return []
-
-
-def _alternatives(annotation: object) -> list[object]:
-    """Members of a union, without the metadata of Annotated."""
-    origin = get_origin(annotation)
-    if origin in (Union, types.UnionType):
-        return [inner for argument in get_args(annotation) for inner in _alternatives(argument)]
-    if hasattr(annotation, "__metadata__"):
-        return _alternatives(get_args(annotation)[0])
-    if origin is tuple:
-        return [inner for argument in get_args(annotation) for inner in _alternatives(argument)]
-    return [annotation]

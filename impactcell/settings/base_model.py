@@ -14,7 +14,7 @@ from impactcell.discrepancy.laws import Shaped
 from impactcell.discrepancy.machine import CATALOGUE, LAW_PLACES, LawForm, NumberPrior, Response, TermChoice
 from impactcell.discrepancy.machine import BaseModel as MachineModel
 from impactcell.errors import SettingsError
-from impactcell.process import yaml_loader
+from impactcell.process import yaml_loader, yaml_schema
 from impactcell.settings.fields import Positive
 from impactcell.settings.uncertain_numbers import Number, NumberOfEach, NumberOfRecords, UncertainNumber
 
@@ -103,7 +103,7 @@ def read_base_model(path: Path) -> tuple[MachineModel, Excitation]:
     SettingsError
         Listing every fault as `file:line:column: message`.
     """
-    file, positions = yaml_loader.read(path, BaseModelFile)
+    file, positions = yaml_schema.read(path, BaseModelFile)
     faults: list[str] = []
     choices: list[TermChoice] = []
     for number, item in enumerate(file.terms):

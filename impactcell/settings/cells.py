@@ -8,7 +8,7 @@ from pathlib import Path
 from impactcell.errors import MapError, SettingsError
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.prediction.model import Model
-from impactcell.process import yaml_loader
+from impactcell.process import yaml_loader, yaml_schema
 from impactcell.process.yaml_loader import Positions
 from impactcell.settings.misnamed_files import MAP, MODEL, why_unusable
 from impactcell.settings.model_file import read_model
@@ -61,7 +61,7 @@ def read_cell(path: Path) -> CellConfig:
     faults: list[str] = []
     settings = register_map = model = None
     try:
-        settings, positions = yaml_loader.read(path, CellSettings)
+        settings, positions = yaml_schema.read(path, CellSettings)
         map_file: Path | None = settings.module.register_map
         model_file: Path | None = settings.model
         order = settings.module.word_order

@@ -11,7 +11,7 @@ from impactcell.physics import Plant
 from impactcell.physics.effects import LIBRARY
 from impactcell.physics.outside_effects import offer_effects, offer_installed, source_of
 from impactcell.prediction.model import DistanceForm, ForceForm, Model, Predictor, Prior, Sensitivity
-from impactcell.process import yaml_loader
+from impactcell.process import yaml_loader, yaml_schema
 from impactcell.process.whole_files import write_whole
 from impactcell.settings.model_sections import INCOMPLETE, ModelFile, ParameterFile
 
@@ -30,7 +30,7 @@ def read_model(path: Path) -> Model:
     SettingsError
         Listing every fault as `file:line:column: message`.
     """
-    file, positions = yaml_loader.read(path, ModelFile)
+    file, positions = yaml_schema.read(path, ModelFile)
     faults = []
     try:
         offer_effects([path.parent / name for name in file.effect_files])

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ConfigDict, Field
 
 from impactcell.errors import SettingsError
-from impactcell.process.yaml_loader import load, read
+from impactcell.process.yaml_loader import load
+from impactcell.process.yaml_schema import read
 
 
 class Part(BaseModel):
