@@ -17,6 +17,7 @@ from impactcell.fieldbus.map_registers import ARRAYS, HEADER, REQUIRED, missing_
 from impactcell.fieldbus.map_validation import validate_map
 from impactcell.fieldbus.register import Register, Value, Words
 from impactcell.fieldbus.register_types import WIRE
+from impactcell.process.file_format import newer_file
 
 __all__ = [
     "REGISTER_SPACE",
@@ -62,8 +63,10 @@ class RegisterMap:
         ------
         MapError
             Listing every fault: unknown keys, wrong types, overlaps, addresses outside 0..65535, missing
-            registers.
+            registers. Of a map for a newer version it is told that it is one, and nothing else.
         """
+        if isinstance(mapping, Mapping) and (is_newer := newer_file(mapping.get("format"))):
+            raise MapError(f"the register map {is_newer}", [is_newer])
         if not isinstance(mapping, Mapping) or not isinstance(mapping.get("registers"), Mapping):
             raise MapError("register map: must be a mapping with format, name and registers")
         validated = validate_map(mapping)

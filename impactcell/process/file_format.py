@@ -16,3 +16,13 @@ def newer_format(number: object) -> str:
     """
     is_newer = isinstance(number, int) and not isinstance(number, bool) and number > NEWEST
     return WAY_OUT if is_newer else ""
+
+
+def newer_file(number: object) -> str:
+    """Say of a file what its format is and what to do, where it is a later one than ours, else nothing.
+
+    >>> newer_file(9), newer_file(1)
+    ('is of format 9; it was written for a newer version of impactcell: run that', '')
+    """
+    way_out = newer_format(number)
+    return f"is of format {number}; {way_out}" if way_out else ""

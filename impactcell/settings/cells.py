@@ -135,6 +135,8 @@ def read_register_map(path: Path, word_order: str | None = None) -> RegisterMap:
 def _place_in_map(fault: str) -> tuple[str, ...]:
     """Say what part of a map file a fault is about."""
     words = fault.replace(":", " ").split()
+    if fault.startswith("is of format"):
+        return ("format",)
     if words[0] in ("register", "registers"):
         return ("registers", words[1])
     return (words[-1],) if fault.startswith("unknown key") else (words[0],)

@@ -6,7 +6,7 @@ from typing import Final
 
 from impactcell.errors import SettingsError
 from impactcell.process import yaml_loader
-from impactcell.process.file_format import newer_format
+from impactcell.process.file_format import newer_file
 
 MAP: Final = "a register map"
 MODEL: Final = "a model"
@@ -31,5 +31,5 @@ def why_unusable(file: Path, kind: str) -> str:
     actual = next((kind for key, kind in _KINDS.items() if key in content), kind)
     if actual != kind:
         return f"{file} is {actual}, not {kind}"
-    way_out = newer_format(content.get("format"))
-    return f"{file} is of format {content['format']}; {way_out}" if way_out else ""
+    is_newer = newer_file(content.get("format"))
+    return f"{file} {is_newer}" if is_newer else ""

@@ -14,6 +14,7 @@ from pymodbus.client import ModbusTcpClient
 from impactcell.errors import MapError
 from impactcell.fieldbus.register_types import SI_FACTOR
 from impactcell.fieldbus.registers import REQUIRED, WIRE, Register, RegisterMap, registers_crc32
+from impactcell.process.file_format import WAY_OUT
 
 FORMATS = {"u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "i64": "q", "f32": "f", "f64": "d"}
 PYMODBUS = {
@@ -317,10 +318,17 @@ def test_what_is_no_map_at_all_is_refused(content: Any) -> None:
         RegisterMap.from_mapping(content)
 
 
-@pytest.mark.parametrize("content", [{"registers": {"a": 1}}, {"format": 2, "registers": {}}])
+@pytest.mark.parametrize("content", [{"registers": {"a": 1}}, {"format": 0, "registers": {}}])
 def test_another_format_is_refused(content: dict[str, Any]) -> None:
     with pytest.raises(MapError, match="format must be 1"):
         RegisterMap.from_mapping(content)
+
+
+@pytest.mark.parametrize("content", [{"format": 2, "registers": {"a": 1}}, {"format": 2, "blocks": []}])
+def test_of_a_newer_format_nothing_else_is_told(content: dict[str, Any]) -> None:
+    with pytest.raises(MapError) as refused:
+        RegisterMap.from_mapping(content)
+    assert str(refused.value) == f"the register map is of format 2; {WAY_OUT}"
 
 
 @given(

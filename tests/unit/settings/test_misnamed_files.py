@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from impactcell.errors import SettingsError
-from impactcell.settings import read_cell
+from impactcell.settings import read_cell, read_register_map
 from tests.unit.settings.test_impossible_paths import CONFIG, cell_file
 
 NEWER = "it was written for a newer version of impactcell: run that"
@@ -51,3 +51,17 @@ def test_a_cell_file_of_a_newer_version_names_the_way_out(tmp_path: Path) -> Non
     cell.write_text(cell.read_text(encoding="utf-8").replace("format: 1", "format: 2"), encoding="utf-8")
     with pytest.raises(SettingsError, match=f"^{cell}:1:9: format: should be 1, not 2; {NEWER}$"):
         read_cell(cell)
+
+
+def test_a_register_map_of_a_newer_version_is_told_alike_without_a_cell(tmp_path: Path) -> None:
+    """It was told what is unknown and missing in it, and that its format must be 1."""
+    file = tmp_path / "map.yaml"
+    text = MAP.read_text(encoding="utf-8").replace("\nformat: 1\n", "\nformat: 9\nnews: 3\n")
+    file.write_text(text, encoding="utf-8")
+    line = text.splitlines().index("format: 9") + 1
+    with pytest.raises(SettingsError) as alone:
+        read_register_map(file)
+    assert str(alone.value) == f"{file}:{line}:1: is of format 9; {NEWER}"
+    with pytest.raises(SettingsError) as within:
+        read_cell(cell_file(tmp_path, "module.register_map", file.name))
+    assert str(within.value).endswith(f"module.register_map: {file} is of format 9; {NEWER}")
