@@ -13,7 +13,7 @@ from impactcell.fieldbus.tap_commands import Objection, ObjectionError, TapComma
 from impactcell.fieldbus.transports import transport_for
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal
-from impactcell.service.factory import cell_design, module_link
+from impactcell.service.factory import cell_design
 from impactcell.service.positioning import PositioningTask
 from impactcell.service.worker import CellWorker
 from impactcell.settings import CellConfig
@@ -36,7 +36,7 @@ class ToldModule(ModuleAcquisition):
     @classmethod
     def of(cls, cell: CellConfig) -> "ToldModule":
         """Make the module of a cell; nothing is ever sent to it."""
-        return cls(cell.name, ModbusClient(transport_for(module_link(cell))), cell.register_map)
+        return cls(cell.name, ModbusClient(transport_for(cell.settings.module.link)), cell.register_map)
 
     @property
     def status(self) -> ModuleStatus:

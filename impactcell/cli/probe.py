@@ -29,7 +29,7 @@ from impactcell.prediction.mass_interpolation import velocity_range_m_s
 from impactcell.process import yaml_loader
 from impactcell.process.console import print_result
 from impactcell.records import MM_PER_MIN, Capture, Channel
-from impactcell.service.factory import cell_design, module_link
+from impactcell.service.factory import cell_design
 from impactcell.settings import CellConfig, read_cell
 from impactcell.settings.service_files import of_module_tls
 
@@ -56,7 +56,7 @@ def probe(cell: Path) -> None:
         The module does not answer, is another one, or shows what its map cannot mean.
     """
     config = read_cell(cell)
-    link = module_link(config)
+    link = config.settings.module.link
     module = ModuleAcquisition(config.name, ModbusClient(transport_for(link)), config.register_map)
     try:
         result = asyncio.run(probe_module(module))

@@ -21,7 +21,7 @@ from impactcell.process.condition_log import ConditionLog
 from impactcell.records import BatchAnnouncement, Evidence, ModuleStatus, PositioningState, Snapshot
 from impactcell.records.uncertainty import plus_minus
 from impactcell.scada import Server
-from impactcell.service.factory import cell_design, module_link
+from impactcell.service.factory import cell_design
 from impactcell.service.fault_alarms import FaultAlarms
 from impactcell.service.monitoring import CellHealth
 from impactcell.service.opening import opened_worker
@@ -72,7 +72,7 @@ class CellTask:
         self._link_changes: asyncio.Queue[ModuleStatus] = asyncio.Queue()
         self._module = ModuleAcquisition(
             cell.name,
-            ModbusClient(transport or transport_for(module_link(cell))),
+            ModbusClient(transport or transport_for(cell.settings.module.link)),
             cell.register_map,
             self._take_link_change,
         )

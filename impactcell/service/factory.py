@@ -10,7 +10,6 @@ from impactcell.alarms.rules import wear_limit, wear_warning
 from impactcell.cell import CellDesign
 from impactcell.cell.preprocessing import CaptureDefaults
 from impactcell.errors import PositioningError, RasterError
-from impactcell.fieldbus.link import ModuleLink, SerialLine, TlsFiles
 from impactcell.fieldbus.positioning_registers import commanded_values
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.journal.retention import Retention
@@ -98,26 +97,6 @@ def alarm_settings(cell: CellConfig) -> AlarmSettings:
         clear_below=chosen.wear_warning_probability_off if warns else math.inf,
     )
     return AlarmSettings(rules)
-
-
-def module_link(cell: CellConfig) -> ModuleLink:
-    """How the module is reached."""
-    module = cell.settings.module
-    tls, serial = module.tls, module.serial
-    return ModuleLink(
-        host=module.host,
-        port=module.port,
-        device_id=module.device_id,
-        window=module.window,
-        max_registers=module.max_registers_per_request,
-        pause_s=module.pause_between_requests_ms * 1e-3,
-        timeout_s=module.timeout_ms * 1e-3,
-        tls=None if tls is None else TlsFiles(tls.ca_certificate, tls.certificate, tls.key, tls.server_name),
-        transport=module.transport,
-        serial=None
-        if serial is None
-        else SerialLine(serial.device, serial.baudrate, serial.parity[0].upper(), serial.stop_bits),
-    )
 
 
 def retention_policy(journal: JournalSection) -> Retention:

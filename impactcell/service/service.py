@@ -25,7 +25,6 @@ from impactcell.service.cell_task import CellTask, SnapshotCallback
 from impactcell.service.factory import (
     cell_description,
     cell_design,
-    module_link,
     server_settings,
 )
 from impactcell.service.history_source import JournalHistory
@@ -86,8 +85,8 @@ class Service:
         """Address of the page that each cell is on, if any, once `run` has started."""
         self._feeds: dict[str, LiveFeed] = {}
         self._has_started = asyncio.Event()
-        shared = Transports(map(module_link, cells))
-        self._transports = {cell.name: shared.transport_for(module_link(cell)) for cell in cells}
+        shared = Transports(cell.settings.module.link for cell in cells)
+        self._transports = {cell.name: shared.transport_for(cell.settings.module.link) for cell in cells}
 
     async def run(self, stop: asyncio.Event, started: Callable[[], None] | None = None) -> None:
         """Run until `stop` is set; `started` is called when every endpoint listens.

@@ -4,7 +4,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
-from impactcell.fieldbus.link import ModuleLink
+from impactcell.fieldbus.link import ModuleLink, SerialLine, TlsFiles
 from impactcell.settings.fields import InputFile, NotNegative, Positive, Section, host_name, module_host
 
 _LINK: Final = ModuleLink()
@@ -75,6 +75,27 @@ class ModuleSection(Section):
     """An answer later than this closes the connection."""
     tls: TlsSection | None = None
     """Encrypted link; absent: plain Modbus TCP."""
+
+    @property
+    def link(self) -> ModuleLink:
+        """How the module is reached."""
+        tls, serial = self.tls, self.serial
+        return ModuleLink(
+            host=self.host,
+            port=self.port,
+            device_id=self.device_id,
+            window=self.window,
+            max_registers=self.max_registers_per_request,
+            pause_s=self.pause_between_requests_ms * 1e-3,
+            timeout_s=self.timeout_ms * 1e-3,
+            tls=None
+            if tls is None
+            else TlsFiles(tls.ca_certificate, tls.certificate, tls.key, tls.server_name),
+            transport=self.transport,
+            serial=None
+            if serial is None
+            else SerialLine(serial.device, serial.baudrate, serial.parity[0].upper(), serial.stop_bits),
+        )
 
     @model_validator(mode="after")
     def _transport_has_what_it_needs(self) -> Self:

@@ -78,16 +78,10 @@ def _port_faults(cell: CellConfig, other: CellConfig) -> Iterator[str]:
                 yield cell.fault(message, *keys)
 
 
-def _endpoint(cell: CellConfig) -> tuple[str, int]:
-    """Where the module is; cells of one endpoint share its connection."""
-    module = cell.settings.module
-    return (host_identity(module.host), module.port) if module.serial is None else (module.serial.device, 0)
-
-
 def _acknowledgement_target(cell: CellConfig) -> tuple[tuple[str, int], int, Path]:
     """Say where a cell acknowledges cycles; a device may serve several cells, each by a map of its own."""
     module = cell.settings.module
-    return _endpoint(cell), module.device_id, module.register_map
+    return module.link.endpoint, module.device_id, module.register_map
 
 
 def _faults_of_sharing(cell: CellConfig, other: CellConfig) -> Iterator[str]:
@@ -112,9 +106,9 @@ def _faults_of_sharing(cell: CellConfig, other: CellConfig) -> Iterator[str]:
 
 def _connection_faults(cell: CellConfig, other: CellConfig) -> Iterator[str]:
     """Say why two cells cannot share the connection to their gateway, or the line that they are on."""
-    if _endpoint(cell) != _endpoint(other):
-        return
     module, shared = cell.settings.module, other.settings.module
+    if module.link.endpoint != shared.link.endpoint:
+        return
     for key in ("transport", "serial", "tls", "timeout_ms"):
         if getattr(module, key) != getattr(shared, key):
             yield cell.fault(

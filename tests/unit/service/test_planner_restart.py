@@ -16,7 +16,7 @@ from impactcell.journal.store import Journal
 from impactcell.positioning import PlannerPosterior
 from impactcell.positioning.model_hypotheses import join, parts_of
 from impactcell.records import PositioningState
-from impactcell.service.factory import cell_design, module_link
+from impactcell.service.factory import cell_design
 from impactcell.service.positioning import PositioningTask
 from impactcell.service.worker import CellWorker
 from impactcell.settings import CellConfig, read_cell
@@ -30,7 +30,7 @@ def cell() -> CellConfig:
 
 
 def task_of(cell: CellConfig, design: core.CellDesign, worker: CellWorker) -> PositioningTask:
-    client = ModbusClient(transport_for(module_link(cell)))
+    client = ModbusClient(transport_for(cell.settings.module.link))
     module = ModuleAcquisition(cell.name, client, cell.register_map)
     return PositioningTask(cell, design, module, worker, lambda: None)
 

@@ -14,7 +14,6 @@ from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.map_registers import NAMES
 from impactcell.fieldbus.map_validation import validate_map
 from impactcell.fieldbus.registers import Register
-from impactcell.service.factory import module_link
 from impactcell.settings import read_cell, read_cells
 from impactcell.settings.cells import read_register_map
 from impactcell.settings.judgement import judge_cell
@@ -41,7 +40,7 @@ def cell_file(directory: Path, name: str = "press-1", **module: Any) -> Path:
 
 
 def link_of(directory: Path, **module: Any) -> ModuleLink:
-    return module_link(read_cell(cell_file(directory, **module)))
+    return read_cell(cell_file(directory, **module)).settings.module.link
 
 
 @pytest.mark.parametrize("block", [block["module"] for block in BLOCKS if "module" in block])
