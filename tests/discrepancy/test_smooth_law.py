@@ -16,10 +16,13 @@ from impactcell.discrepancy.machine import (
     MachineLaw,
     NumberPrior,
     investigate_machine,
+    law_search,
     motions,
     simulate_held_out,
 )
-from impactcell.discrepancy.machine.law_refusal import GIVES_ENERGY
+from impactcell.discrepancy.machine.law_refusal import GIVES_ENERGY, NOT_IN_BLOCKS, not_in_one_place
+from impactcell.discrepancy.machine.smooth_law import SmoothLaw, smooth_law
+from impactcell.discrepancy.report.german_reasons import reason
 from impactcell.records import Samples
 from tests.discrepancy.smooth_slide import SLIDE, Law, slide, wandering
 
@@ -148,3 +151,28 @@ def test_one_that_gives_energy_is_refused() -> None:
     assert math.isfinite(finding.fall.after)
     assert finding.law is None
     assert finding.law_refused == GIVES_ENERGY
+
+
+@pytest.mark.parametrize(
+    "fault", ["on held-out blocks the gap does not fall by more than chance", NOT_IN_BLOCKS]
+)
+def test_one_that_is_refused_is_not_said_to_explain_what_remains(
+    monkeypatch: pytest.MonkeyPatch, fault: str
+) -> None:
+    """It was: "a smooth force ... explains what remains as well as a law in one place"."""
+
+    def hold_it_to_nothing(*arguments: Any) -> SmoothLaw:
+        smooth = smooth_law(*arguments)
+        return replace(smooth, gains=np.zeros_like(smooth.gains)) if fault == NOT_IN_BLOCKS else smooth
+
+    monkeypatch.setattr(law_search, "smooth_law", hold_it_to_nothing)
+    monkeypatch.setattr(law_search, "refusal_of", lambda *_: fault)
+    finding = investigate_machine(slide(wandering, 4), SLIDE)
+    assert finding.law is None
+    assert finding.law_refused == not_in_one_place(fault)
+    assert "explains" not in finding.law_refused
+    language, german = reason(finding.law_refused)
+    assert language == "de"
+    assert german.startswith(
+        "neben einer glatten Kraft über Ort und Geschwindigkeit braucht der Rest kein Gesetz"
+    )

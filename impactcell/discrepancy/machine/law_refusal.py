@@ -17,13 +17,21 @@ NOTHING_HELPS = (
     "after block that it was not fitted to"
 )
 """Why no law is proposed where no spline holds."""
-NOT_IN_ONE_PLACE = "a smooth force of position and speed explains what remains as well as a law in one place"
-"""Why none is proposed where records need no function in one place beside such a force."""
+NOT_IN_BLOCKS = "it does not help block after block that it was not fitted to"
+"""Why a smooth force of velocity and position is not proposed."""
 LEAST_INERTIA = 0.3
 """Times the inertia without a law, below which the law stands in for the drive: with all of it cancelled and
 no inertia the equation of motion is 0 = 0 [1]."""
 NEGATIVE_SHARE = 0.02
 """Share of the largest friction by which it may be below zero before it gives energy [1]."""
+
+
+def not_in_one_place(fault: str) -> str:
+    """Say why no law is proposed where a smooth force, refused for a fault, leaves none in one place."""
+    return (
+        "beside a smooth force of position and speed what remains needs no law in one place, and that force "
+        f"is none either: {fault}"
+    )
 
 
 def refusal_of(finding: MachineFinding, law: MachineLaw, tests: int) -> str:

@@ -8,6 +8,7 @@ tried, and the error of the test is shared among all that may be. Where records 
 what remains may be a smooth force of velocity and position (`smooth_law.py`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from impactcell.discrepancy.machine.base_model import TermChoice
@@ -25,9 +26,10 @@ from impactcell.discrepancy.machine.law_forms import Forms, nearest_forms
 from impactcell.discrepancy.machine.law_proof import proved_form, simulated_without
 from impactcell.discrepancy.machine.law_refusal import (
     GIVES_ENERGY,
-    NOT_IN_ONE_PLACE,
+    NOT_IN_BLOCKS,
     NOTHING_HELPS,
     listed_instead,
+    not_in_one_place,
     refusal_of,
 )
 from impactcell.discrepancy.machine.law_terms import LAW_PREFIX
@@ -107,18 +109,18 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNu
     excess = float(before.sum() - training.noise.sum())
     holding = [spline for spline in tried if _holds(spline.gains, MIN_SHARE * excess)]
     if not holding:
-        return looked_at.smooth_law(MIN_SHARE * excess) or NOTHING_HELPS
+        return looked_at.smooth_law(MIN_SHARE * excess, lambda _: NOTHING_HELPS)
     numbers = looked_at.numbers(NEARLY_ALL * excess)
     as_well = [[one for one, gains in numbers if _stands_for(one, gains, spline.gains)] for spline in holding]
     if as_well[0]:
         return as_well[0][0]
     needs = needs_of_free_forms(fits.smooth_force(own).beside(columns))
-    refused = ""
+    refused, needs_none = "", False
     for spline, instead in zip(holding, as_well, strict=True):
         if instead:
             continue
         if needs[spline.form] < MIN_NEED:
-            refused = refused or NOT_IN_ONE_PLACE
+            needs_none = needs_none or not refused
             continue
         law = looked_at.law_in(spline, len(holding))
         fault = refusal_of(finding, law, len(holding))
@@ -127,9 +129,7 @@ def _find_law(fits: MachineFits, finding: MachineFinding) -> MachineLaw | HeldNu
         refused = refused or fault
         if fault == GIVES_ENERGY:  # held-out blocks want it all the same: it stands for something else
             break
-    if refused == NOT_IN_ONE_PLACE:
-        return looked_at.smooth_law(MIN_SHARE * excess) or refused
-    return refused
+    return looked_at.smooth_law(MIN_SHARE * excess, not_in_one_place) if needs_none else refused
 
 
 def _holds(gains: Samples, least: float) -> bool:
@@ -187,18 +187,21 @@ class _LookedAt:
                 found.append((number, gains))
         return sorted(found, key=lambda one: -float(one[1].sum()))
 
-    def smooth_law(self, least: float) -> MachineLaw | HeldNumber | str:
-        """Smooth force of velocity and position, if records confirm it, or what does as well; else empty."""
+    def smooth_law(self, least: float, refused: Callable[[str], str]) -> MachineLaw | HeldNumber | str:
+        """Smooth force of velocity and position, if records confirm it, or what does as well.
+
+        Else why there is none: `refused` makes it of what is wrong with that force.
+        """
         fits, columns = self.fits, list(self.model.fit.columns)
         smooth = smooth_law(fits, self.own, columns, self.before)
         if not _holds(smooth.gains, least):
-            return ""
+            return refused(NOT_IN_BLOCKS)
         for number, gains in self.numbers(NEARLY_ALL * float(smooth.gains.sum())):
             if _stands_for(number, gains, smooth.gains):
                 return number
         law = as_law(fits, self.finding, self.model, smooth)
         fault = refusal_of(self.finding, law, len(self.splines) + 1)
-        return law if not fault else fault if fault == GIVES_ENERGY else ""
+        return law if not fault else fault if fault == GIVES_ENERGY else refused(fault)
 
     def law_in(self, spline: FreeSpline, tests: int) -> MachineLaw:
         """Condense a spline to a law, and hold it to what it was not fitted to; one of so many `tests`."""

@@ -77,8 +77,12 @@ REASONS: Final[Patterns] = (
      "eine freie Form an anderer Stelle ist viel besser als jeder benannte Term"),
     (r"a smooth force of position and speed explains these records as well as any named term",
      "eine glatte Kraft über Ort und Geschwindigkeit erklärt diese Messungen so gut wie jeder Term"),
-    (r"a smooth force of position and speed explains what remains as well as a law in one place",
-     "eine glatte Kraft über Ort und Geschwindigkeit erklärt den Rest so gut wie ein Gesetz an einer Stelle"),
+    ((r"beside a smooth force of position and speed what remains needs no law in one place, and that force "
+      r"is none either: (.+)"),
+     lambda m: "neben einer glatten Kraft über Ort und Geschwindigkeit braucht der Rest kein Gesetz an einer "
+     f"Stelle, und diese Kraft ist auch keines: {said}" if (said := translated(m[1], REASONS)) else ""),
+    (r"it does not help block after block that it was not fitted to",
+     "sie hilft nicht in einem Block um den anderen, der nicht angepasst wurde"),
     (r"the base model has it", "das Grundmodell hat es schon"),
     (r"on these records it looks like inertia, gravity or drive",
      "in diesen Messungen sieht es aus wie Trägheit, Schwerkraft oder Antrieb"),
