@@ -21,14 +21,13 @@ from impactcell.demo.auto_teach import AutoTeach
 from impactcell.demo.endings import end_once, ended_by_signals
 from impactcell.demo.scenario_setup import USER, DemoSetup, set_up_scenario
 from impactcell.demo.targets import number, targets_json, targets_table
-from impactcell.demo.view import Scene, render
+from impactcell.demo.view import Scene, coefficient_text, render
 from impactcell.errors import ImpactCellError
 from impactcell.numerics.compilation import has_lacked_code
 from impactcell.positioning.task_state_machine import TaskOutcome
 from impactcell.process.console import is_quiet, print_note
 from impactcell.process.signals import ends_of_terminal, stop_on_signals
 from impactcell.records import ModuleStatus, Snapshot
-from impactcell.records.uncertainty import plus_minus
 from impactcell.service import Service
 
 SHOWN_CYCLES = 400
@@ -281,10 +280,9 @@ def _rendered(scene: Scene) -> RenderableType:
 
 
 def _print_line(_: _DemoRun, snapshot: Snapshot) -> None:
-    mu_s = snapshot.friction.mu_s
     active = (alarm.name for alarm in snapshot.alarms if alarm.active)
-    batch = f"batch {snapshot.batch.batch_id}"
-    facts = (f"mu_s {plus_minus(mu_s.value, mu_s.std, '.4f')}", batch, *active)
+    batch = f"batch {snapshot.batch.batch_id or 'unnamed'}"
+    facts = (f"mu_s {coefficient_text(snapshot.friction.mu_s)}", batch, *active)
     print(f"cycle {snapshot.cycle}: {', '.join(facts)}", flush=True)  # noqa: T201 - where there is no terminal
 
 

@@ -95,7 +95,7 @@ def _facts(last: Snapshot, *, wide: bool, rows: int | None = None) -> Table:
     friction = last.friction
     left_column: list[tuple[str, str | Text]] = [
         ("mu_s", _coefficient(last)),
-        ("mu_k", _value(friction.mu_k)),
+        ("mu_k", coefficient_text(friction.mu_k)),
         ("peak force", _measured(friction.peak_force_n, "N", 1)),
         ("slid", _measured(friction.sliding_distance_m * 1e6, "µm", 0)),
     ]
@@ -124,15 +124,11 @@ def _facts(last: Snapshot, *, wide: bool, rows: int | None = None) -> Table:
 
 def _plus_minus(value: float, std: float, sign: str = "") -> str:
     """Show four decimals, or as many as the first digit of the standard deviation needs."""
-    if math.isnan(value):
-        return "none"
     decimals = 4 if not 0.0 < std < 1e-4 else min(-math.floor(math.log10(std)), 7)
-    if not math.isfinite(std):
-        return f"{value:{sign}.4f}"
     return plus_minus(value, std, f"{sign}.{decimals}f", f".{decimals}f")
 
 
-def _value(coefficient: Coefficient) -> str:
+def coefficient_text(coefficient: Coefficient) -> str:
     """Show a coefficient; where there is none, why."""
     said = _plus_minus(coefficient.value, coefficient.std)
     return f"{said}: {coefficient.reason}" if math.isnan(coefficient.value) and coefficient.reason else said
@@ -144,7 +140,7 @@ def _measured(value: float, unit: str, decimals: int) -> str:
 
 def _coefficient(snapshot: Snapshot) -> Text:
     mu_s = snapshot.friction.mu_s
-    text = Text(_value(mu_s), style=QUALITY_STYLE[mu_s.quality])
+    text = Text(coefficient_text(mu_s), style=QUALITY_STYLE[mu_s.quality])
     by = snapshot.friction.estimator
     return text if by is Estimator.NONE else text.append(f"  by {by.value}", style="dim")
 

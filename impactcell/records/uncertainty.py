@@ -40,7 +40,13 @@ def told_cycles_left(left: float, low: float, high: float, form: str) -> str:
 def plus_minus(value: float, std: float, form: str, std_form: str = "") -> str:
     """Write a value with what is told of its standard deviation, in Python's format specifications.
 
-    >>> plus_minus(0.203, 0.0005, ".4f")
-    '0.2030 ± 0.0010'
+    What is not known is `none`; a value of which nobody knows how sure it is stands alone.
+
+    >>> [plus_minus(mu, std, ".4f") for mu, std in ((0.203, 0.0005), (math.nan, math.nan), (0.2, math.inf))]
+    ['0.2030 ± 0.0010', 'none', '0.2000']
     """
+    if math.isnan(value):
+        return "none"
+    if not math.isfinite(std):
+        return f"{value:{form}}"
     return f"{value:{form}} ± {TOLD_STDS * std:{std_form or form}}"

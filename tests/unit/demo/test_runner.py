@@ -7,7 +7,7 @@ import signal
 from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import pytest
 
@@ -15,7 +15,7 @@ from impactcell.demo import runner
 from impactcell.demo.scenario_setup import DemoSetup, last_target_m
 from impactcell.errors import ImpactCellError
 from impactcell.process.signals import ends_of_terminal, stop_on_signals
-from impactcell.records import PositioningState
+from impactcell.records import Coefficient, PositioningState
 from tests.snapshots import make_capture, make_snapshot
 from tests.virtual_time import run_virtually
 
@@ -123,3 +123,12 @@ async def test_the_first_cycle_is_waited_for_longer_than_the_next(
         ImpactCellError, match=f"no cycle for {0.02 if seen else 0.03} s: the module is silent"
     ):
         await playing._watch(asyncio.Event(), asyncio.Event())
+
+
+def test_a_line_says_none_of_what_is_not_known(capsys: pytest.CaptureFixture[str]) -> None:
+    """It said "mu_s nan ± nan", and a batch without a name was nothing after a space."""
+    snapshot = make_snapshot(make_capture(7, samples=8))
+    unknown = replace(snapshot.friction, mu_s=Coefficient(reason="clipped"))
+    blank = replace(snapshot, friction=unknown, batch=replace(snapshot.batch, batch_id=""), alarms=())
+    runner._print_line(cast("Any", None), blank)
+    assert capsys.readouterr().out == "cycle 7: mu_s none: clipped, batch unnamed\n"
