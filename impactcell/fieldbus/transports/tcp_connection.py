@@ -143,7 +143,8 @@ class TcpConnection(asyncio.BufferedProtocol):
         """Fail what is pending (called by asyncio)."""
         self.lost.set()
         if self._transport is not None:
-            self.fail(ConnectionLostError(f"{self.link}: connection lost{f': {exc}' if exc else ''}"))
+            why = exc.strerror if isinstance(exc, OSError) and exc.strerror else exc
+            self.fail(ConnectionLostError(f"{self.link}: connection lost{f': {why}' if why else ''}"))
 
     def _send_waiting(self) -> bool:
         """Send what the window allows, in one write; return whether there was anything."""

@@ -1,6 +1,9 @@
 """The checked transport, against the simulator's server and against peers written out byte by byte."""
 
 import asyncio
+import errno
+import os
+import socket
 import struct
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
@@ -185,6 +188,26 @@ async def test_a_device_that_stays_busy_is_an_error_by_name() -> None:
         with pytest.raises(ModbusExceptionError, match="server device busy"):
             await client.read(0, 10)
         assert client.connected
+
+
+async def test_a_connection_that_is_reset_is_told_in_words() -> None:
+    """It said "[Errno 104] Connection reset by peer", on the page and in the alarm."""
+
+    async def reset(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await reader.read(1)
+        without_goodbye = struct.pack("ii", 1, 0)
+        writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, without_goodbye)
+        writer.transport.abort()
+
+    peer = await asyncio.start_server(reset, "127.0.0.1", 0)
+    link = ModuleLink(port=peer.sockets[0].getsockname()[1], window=1, timeout_s=SILENT_S)
+    client = ModbusClient(transport_for(link))
+    async with peer:
+        await client.connect()
+        with pytest.raises(LinkError) as lost:
+            await client.read(0, 1)
+        await client.close()
+    assert str(lost.value) == f"{link}: connection lost: {os.strerror(errno.ECONNRESET)}"
 
 
 async def test_a_disconnect_fails_everything_at_once() -> None:
