@@ -21,6 +21,7 @@ def track(
     *,
     batch: Sequence[object] | None = None,
     limit: float | None = None,
+    mu_s_common_std: ArrayLike | None = None,
 ) -> TrackedSeries:
     """Track wear and batch over a series of friction estimates, and raise what alarms there are.
 
@@ -37,6 +38,10 @@ def track(
         changes of batch are found in the series.
     limit : float, optional
         mu_s at which the surface is worn; without it there is no alarm of wear.
+    mu_s_common_std : array_like, shape (n,), optional
+        Part of the standard deviations that all cycles share (`friction.mu_s.common_std` of an estimate), one
+        number for all or one each: `wear.level_common_std` is what of it is in the level, beside
+        `wear.level_std`.
 
     Returns
     -------
@@ -59,13 +64,16 @@ def track(
     [('BatchShift', 250)]
     """
     cycles, values = _numbers("cycle", cycle), _numbers("mu_s", mu_s)
-    stds = _numbers("mu_s_std", math.nan if mu_s_std is None else mu_s_std)
-    if mu_s_std is None or np.ndim(mu_s_std) == 0:
-        stds = np.broadcast_to(stds, values.shape)
+    stds = _each("mu_s_std", mu_s_std, values)
+    commons = _each("mu_s_common_std", mu_s_common_std, values)
+    if (commons < 0.0).any() or np.isinf(commons).any():
+        raise SeriesError("mu_s_common_std is to be 0 or above, and nan where it is not known")
     batches = [None] * len(cycles) if batch is None else _batch_ids(batch)
     sizes = [cycles.shape, values.shape, stds.shape, (len(batches),)]
     if len(set(sizes)) != 1 or cycles.ndim != 1:
         raise SeriesError(f"cycle, mu_s, mu_s_std and batch must be of one length, not of shapes {sizes}")
+    if commons.shape != cycles.shape:
+        raise SeriesError(f"mu_s_common_std must be as long as cycle, not of shape {commons.shape}")
     for place, number in enumerate(cycles):
         if fault := whole_number_fault(number):
             raise SeriesError(f"cycle[{place}] = {number:g} {fault}")
@@ -78,8 +86,8 @@ def track(
             f"give the mu_s at which it is worn, {0.01 * worn:g} if that was meant in %"
         )
     observations = [
-        FrictionObservation(int(at), float(value), float(std), batch_id=batch_id)
-        for at, value, std, batch_id in zip(cycles, values, stds, batches, strict=True)
+        FrictionObservation(int(at), float(value), float(std), batch_id=batch_id, common_std=float(common))
+        for at, value, std, batch_id, common in zip(cycles, values, stds, batches, commons, strict=True)
     ]
     knowledge = BatchKnowledge.UNKNOWN if batch is None else BatchKnowledge.KNOWN
     return replay(TrackerSettings(wear_limit=worn, batch=knowledge), observations)
@@ -88,6 +96,12 @@ def track(
 def _numbers(name: str, given: ArrayLike) -> Samples:
     """Give an array of numbers; what a masked one hides is nan."""
     return np.atleast_1d(numbers(name, given, SeriesError))
+
+
+def _each(name: str, given: ArrayLike | None, values: Samples) -> Samples:
+    """Give a number for each of the values, of one for all or of one each; nan without any."""
+    each = _numbers(name, math.nan if given is None else given)
+    return np.broadcast_to(each, values.shape) if given is None or np.ndim(given) == 0 else each
 
 
 def _one_number(name: str, given: ArrayLike) -> float:

@@ -35,7 +35,7 @@ from impactcell.records import FrictionEstimate, Quality, as_recorded
 COLUMNS = (
     "shot", "mu_s_force", "mu_s_distance", "mu_s_combined", "mu_s", "mu_s_std", "mu_k", "mu_k_std",
     "mu_s_force_std", "mu_s_distance_std", "mu_s_combined_std", "estimator", "quality", "mu_k_quality",
-    "peak_force_n", "sliding_distance_m", "gap", "reason",
+    "peak_force_n", "sliding_distance_m", "gap", "reason", "mu_s_common_std",
 )  # fmt: skip
 
 WORDS = ("estimator", "quality", "mu_k_quality", "reason")
@@ -46,6 +46,8 @@ def estimate(
     campaign: Path, cell: Path | None = None, output: Path | None = None, *, as_json: bool = False
 ) -> None:
     """Write a row a shot: mu_s by equations (4), (5), (6) and the waveform, and mu_k.
+
+    `mu_s_common_std` is the part of `mu_s_std` that all taps share: their mean is no better than that.
 
     Parameters
     ----------
@@ -195,6 +197,7 @@ def _write(rows: Iterable[tuple[int, FrictionEstimate]], file: TextIO) -> None:
                 friction.mu_k.quality.name.lower(),
                 *map(_number, measured),
                 friction.mu_s.reason,
+                _number(friction.mu_s.common_std),
             ]
         )
 

@@ -16,8 +16,10 @@ from impactcell.measurements.text_layout import is_comment
 from impactcell.measurements.units import parse_unit
 from impactcell.tracking.wear_batch import FrictionObservation
 
-COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch")
+COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch", "mu_s_common_std")
 """What is read; the first two have to be there."""
+COMMON_STD = "mu_s_common_std"
+"""Column of the part of mu_s_std that all cycles share, as `impactcell estimate` writes it."""
 SHOT = "shot"
 """What `impactcell estimate` calls a cycle of a campaign."""
 FIRST_LINE = "cycle,mu_s,mu_s_std[,batch]"
@@ -185,9 +187,10 @@ def _reading(cells: dict[str, str], decimal: str) -> tuple[FrictionObservation, 
         number = 0.0
     mu_s, fault_of_mu_s = _number("mu_s", cells["mu_s"], decimal)
     std, fault_of_std = _number("mu_s_std", cells.get("mu_s_std", ""), decimal)
-    faults += [fault for fault in (fault_of_mu_s, fault_of_std) if fault]
-    batch = cells.get("batch", "")
-    return FrictionObservation(int(number), mu_s, std, batch_id=None if is_missing(batch) else batch), faults
+    common, fault_of_common = _number(COMMON_STD, cells.get(COMMON_STD, ""), decimal)
+    faults += [fault for fault in (fault_of_mu_s, fault_of_std, fault_of_common) if fault]
+    batch = None if is_missing(batch := cells.get("batch", "")) else batch
+    return FrictionObservation(int(number), mu_s, std, batch_id=batch, common_std=common), faults
 
 
 def _number(name: str, cell: str, decimal: str) -> tuple[float, str]:
@@ -200,7 +203,7 @@ def _number(name: str, cell: str, decimal: str) -> tuple[float, str]:
     if value is None or is_grouped(cell, decimal):
         mark = "point" if decimal == "." else "comma"
         return math.nan, f"{name} `{cell}` is not a number with decimal {mark}; leave it empty if missing"
-    if name == "mu_s_std" and (value < 0.0 or math.isinf(value)):
+    if name != "mu_s" and (value < 0.0 or math.isinf(value)):
         return value, f"{name} `{cell}` is no standard deviation; leave it empty if it is not known"
     return value, ""
 

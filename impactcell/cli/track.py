@@ -32,6 +32,9 @@ def track(
 ) -> None:
     """Replay a series `cycle,mu_s,mu_s_std[,batch]` and print wear, rate and alarms.
 
+    A column `mu_s_common_std` says which part of mu_s_std all cycles share, as an error of the model's
+    mu_k/mu_s: that is told of the level beside its own interval, which averages over cycles.
+
     Parameters
     ----------
     batch : "known", "unknown" or None
@@ -110,6 +113,7 @@ def _as_json(series: TrackedSeries) -> dict[str, object]:
         "slope_std": wear.rate_std,
         "level": wear.level,
         "level_std": wear.level_std,
+        "level_common_std": _finite(wear.level_common_std),
         "batch_offset": batch.offset,
         "batch_offset_std": batch.offset_std,
         "friction": series.friction,
@@ -151,6 +155,7 @@ def _as_text(series: TrackedSeries, *, is_told: bool) -> str:
     lines = [
         f"{series.used} cycles used",
         f"level   {level} (95 %, as all ± below): mu_s with the first batch{alone}",
+        *_common_line(wear.level_common_std),
         *(_batch_lines(series) if has_other else []),
         f"wear    {rate} per 1000 cycles",
     ]
@@ -159,6 +164,13 @@ def _as_text(series: TrackedSeries, *, is_told: bool) -> str:
         lines.append(f"limit   {wear.limit:g}, cycles to it: {told_cycles_left(*left, '{}, 95 %: {} .. {}')}")
     lines.extend(_alarm_line(raised, series) for raised in series.alarms)
     return "\n".join([*lines, *_note_lines(series.notes)])
+
+
+def _common_line(common_std: float) -> list[str]:
+    """Say what may be wrong in all cycles alike; nothing where no cycle says so."""
+    if not common_std > 0.0:
+        return []
+    return [f"common  ± {TOLD_STDS * common_std:.5f} more: mu_s may be off by that in all cycles alike"]
 
 
 def _has_other_batch(series: TrackedSeries) -> bool:
