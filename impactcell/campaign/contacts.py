@@ -79,8 +79,11 @@ def baseline_of(force: Samples, threshold_n: float | None = None) -> Baseline:
     return Baseline(offset, noise, threshold_n)
 
 
-def contact_onsets(time: Samples, force: Samples, baseline: Baseline) -> list[int]:
-    """Index of the first sample of each tap's first contact; a spike is none, and hides none after it."""
+def contact_onsets(time: Samples, force: Samples, baseline: Baseline, gap_s: float = SHOT_GAP_S) -> list[int]:
+    """Index of the first sample of each tap's first contact, which no other precedes by less than the gap.
+
+    A spike is no contact, and hides none after it.
+    """
     above = force - baseline.offset > baseline.threshold
     run = above.copy()
     for step in range(1, CONFIRMING_SAMPLES):
@@ -90,7 +93,7 @@ def contact_onsets(time: Samples, force: Samples, baseline: Baseline) -> list[in
     touching = np.flatnonzero(np.convolve(run, np.ones(CONFIRMING_SAMPLES))[: len(run)] > 0.0)
     for start in starts.tolist():
         earlier = touching[touching < start]
-        is_new = not earlier.size or time[start] - time[earlier[-1]] > SHOT_GAP_S
+        is_new = not earlier.size or time[start] - time[earlier[-1]] > gap_s
         if is_new:
             onsets.append(start)
     return onsets

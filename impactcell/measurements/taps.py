@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
+from collections.abc import Mapping as AbstractMapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,6 +16,8 @@ from impactcell.measurements.given_values import Given
 from impactcell.measurements.measured_records import Record
 from impactcell.measurements.put_back import from_its_place
 from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
+from impactcell.measurements.record_parts import end_of_tap, part_of
+from impactcell.measurements.soon_taps import SoonTaps, doubts_of, soon_taps
 from impactcell.numerics.spikes import noise_of
 from impactcell.records import MM_PER_MIN, Capture, Channel, Samples
 
@@ -55,19 +58,24 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
     left_out: list[str] = []
     struck: list[Record] = []
     missed: list[Record] = []
+    soon: list[tuple[Record, SoonTaps]] = []
     for record in in_compression(records, given, notes, faults):
         onsets = _onsets(record, given)
         if onsets is not None and not onsets:
             missed.append(record)
             continue
         struck.append(record)
-        taps += _taps(record, onsets, given, faults, left_out)
+        leads = {}
+        if onsets is not None:
+            soon.append((record, _soon_taps(record, onsets, given)))
+            onsets, leads = soon[-1][1].onsets, soon[-1][1].leads_s
+        taps += _taps(record, onsets, leads, given, faults, left_out)
     faults += [] if struck else [_without_contact(record, given) for record in missed]
     raise_faults(faults)
     if len(taps) > len(struck):
         told = "1 record" if len(struck) == 1 else f"{len(struck)} records"
         notes.append(f"{told} cut into {len(taps)} taps where the force begins anew")
-    notes += _of_actuator(taps)
+    notes += [*doubts_of(soon), *_of_actuator(taps)]
     taps = _from_their_places(taps, notes)
     if left_out:
         notes.append(f"taps left out whose beginning was not recorded: {_counted(left_out)}")
@@ -89,7 +97,7 @@ def _counted(places: Sequence[str]) -> str:
     return f"1, in {first}" if len(places) == 1 else f"{len(places)}, the first in {first}"
 
 
-def _onsets(record: Record, given: Given) -> list[int] | None:
+def _onsets(record: Record, given: Given) -> Sequence[int] | None:
     """Give the samples at which contacts begin; None where t = 0 is said to be the contact."""
     if given.trigger == NO_TRIGGER:
         return None
@@ -97,6 +105,14 @@ def _onsets(record: Record, given: Given) -> list[int] | None:
     if np.ptp(force) == 0.0:
         return []
     return contacts.contact_onsets(time, force, contacts.baseline_of(force, _threshold(given)))
+
+
+def _soon_taps(record: Record, onsets: Sequence[int], given: Given) -> SoonTaps:
+    velocity = given.constants.get("velocity", record.scalars.get("velocity"))
+    if not isinstance(velocity, float):
+        velocity = _slope(record, onsets[0]) if ColumnMeaning.ACTUATOR in record.values else math.nan
+    baseline = contacts.baseline_of(record.values[ColumnMeaning.FORCE], _threshold(given))
+    return soon_taps(record, onsets, baseline, given.constants.get("stroke", math.inf), velocity)
 
 
 def _threshold(given: Given) -> float | None:
@@ -120,7 +136,12 @@ def _without_contact(record: Record, given: Given) -> str:
 
 
 def _taps(
-    record: Record, onsets: Sequence[int] | None, given: Given, faults: list[str], left_out: list[str]
+    record: Record,
+    onsets: Sequence[int] | None,
+    leads_s: AbstractMapping[int, float],
+    given: Given,
+    faults: list[str],
+    left_out: list[str],
 ) -> list[_TapRecord]:
     time = record.times[ColumnMeaning.FORCE]
     if onsets is None:
@@ -130,37 +151,13 @@ def _taps(
         return _with_velocity([(record, None if begins_at_contact else onsets[0])], given, faults)
     parts: list[tuple[Record, int]] = []
     for onset, after in zip(onsets, (*onsets[1:], None), strict=True):
-        end_s = math.inf if after is None else float(time[after]) - contacts.REST_S
-        parts.append(_part(record, onset, _end(record, float(time[onset]), end_s)))
+        end_s = math.inf if after is None else float(time[after]) - leads_s.get(after, contacts.REST_S)
+        end_s = end_of_tap(record, float(time[onset]), end_s)
+        parts.append(part_of(record, onset, leads_s.get(onset, contacts.REST_S), end_s))
     if onsets[0] == 0 and any(onset >= contacts.CONFIRMING_SAMPLES for _, onset in parts):
         left_out.append(record.place)  # of the others the beginning was recorded
         del parts[0]
     return _with_velocity(parts, given, faults)
-
-
-def _end(record: Record, onset_s: float, next_s: float) -> float:
-    """When the part has come to rest, and the record says no more of this tap."""
-    if ColumnMeaning.POSITION not in record.values:
-        return next_s
-    time, position = record.times[ColumnMeaning.POSITION], record.values[ColumnMeaning.POSITION]
-    stretch = (time >= onset_s) & (time < next_s)
-    if stretch.sum() < 10:
-        return next_s
-    return min(contacts.rest_end(time[stretch], position[stretch], onset_s), next_s)
-
-
-def _part(record: Record, onset: int, end_s: float) -> tuple[Record, int]:
-    """Cut one tap out of a record that has several."""
-    time = record.times[ColumnMeaning.FORCE]
-    begin_s = time[onset] - contacts.REST_S
-    kept = {q: (t >= begin_s) & (t <= end_s) for q, t in record.times.items()}
-    part = replace(
-        record,
-        place=f"{record.place}: tap at {time[onset]:.6g} s",
-        times={q: record.times[q][rows] for q, rows in kept.items()},
-        values={q: record.values[q][rows] for q, rows in kept.items()},
-    )
-    return part, int(onset - np.count_nonzero(time[:onset] < begin_s))
 
 
 def _with_velocity(

@@ -47,6 +47,15 @@ GERMAN: Final = {
         r"zusammengefügt: \1 und \2, nach den Zeitpunkten darin, \3 s auseinander; \4 weitere ebenso",
     r"(\d+) records cut into (\d+) taps where the force begins anew":
         r"\1 Aufzeichnungen in \2 Stöße geteilt, wo die Kraft neu beginnt",
+    r"(.+): contact at (\S+) s and, after the part lay still, at (\S+) s, taken for one tap, in (\d+) "
+    r"records?: with the stroke, two taps are cut where the actuator had halted":
+        r"\1: Kontakt bei \2 s und, nachdem das Teil ruhte, bei \3 s, für einen Stoß genommen "
+        r"(Aufzeichnungen: \4); mit dem Hub werden zwei Stöße geteilt, wo der Antrieb schon stand",
+    r"(.+): contact at (\S+) s and, after the part lay still, at (\S+) s, taken for one tap, in (\d+) "
+    r"records?: the actuator may still have been under way; if these are two taps, cut the file between them":
+        r"\1: Kontakt bei \2 s und, nachdem das Teil ruhte, bei \3 s, für einen Stoß genommen "
+        r"(Aufzeichnungen: \4): der Antrieb kann noch unterwegs gewesen sein; sind es zwei Stöße, die Datei "
+        "dazwischen teilen",
     r"t = 0 put where the force begins, in (\d+) taps?, good to a part of the sampling step of (\S+) ms; "
     r"what lies before is kept as pretrigger":
         r"t = 0 liegt, wo die Kraft beginnt (Stöße: \1), genau auf einen Teil des Abtastschritts von \2 ms; "
