@@ -10,7 +10,6 @@ from scipy.integrate import cumulative_trapezoid
 
 from impactcell.campaign import LARGEST
 from impactcell.errors import MeasurementError
-from impactcell.measurements.assignment import TURN_ROUND, more_digits, runs_backwards
 from impactcell.measurements.faults import raise_faults
 from impactcell.measurements.groups import places_beside
 from impactcell.measurements.mapping import Mapping
@@ -19,6 +18,7 @@ from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.sampling_step import doubt_of_step, sampling_step_s
 from impactcell.measurements.scalars import scalars_of
 from impactcell.measurements.table import MeasuredColumn, Table
+from impactcell.measurements.times_out_of_order import not_increasing
 from impactcell.records import Samples
 
 
@@ -230,27 +230,9 @@ def _time(table: Table, mapping: Mapping, faults: list[str]) -> Samples | None:
         return None
     steps = np.diff(time)
     if (steps <= 0.0).any():
-        faults.append(_not_increasing(table, column, steps))
+        faults.append(not_increasing(table, column, steps))
         return None
     return time
-
-
-def _not_increasing(table: Table, column: MeasuredColumn, steps: Samples) -> str:
-    """Tell times that go back, which several shots do, from times that only repeat, which rounding makes."""
-    if runs_backwards(steps):
-        return f"{table.title}: column {column.name!r} (time) runs backwards; {TURN_ROUND}"
-    goes_back = bool((steps < 0.0).any())
-    rows = np.flatnonzero(steps < 0.0 if goes_back else steps == 0.0) + 1
-    way_out = (
-        "several shots in one file need a column that numbers them (--column shot=NAME)"
-        if goes_back
-        else more_digits(column.name)
-    )
-    row = int(rows[0])
-    return (
-        f"{table.place(row)}: time does not increase: {column.values[row]:.9g} after "
-        f"{column.values[row - 1]:.9g} ({rows.size} such rows); {way_out}"
-    )
 
 
 def later_s(first: Record, second: Record) -> float:

@@ -51,6 +51,21 @@ FAULTS_OF_TIMES: Final = (
         "die Zeit wächst nicht: {after} nach {before} ({rows} solche Zeilen); " + ROUNDED_GERMAN,
     ),
     FaultPattern(
+        NOT_INCREASING + r"(?P<unit>line|row) (?P<line>\d+) is out of order: .*",
+        "time does not increase: {after} after {before} ({rows} such rows); {unit} {line} is out of order: "
+        "delete it, or sort the rows by their time",
+        "die Zeit wächst nicht: {after} nach {before} ({rows} solche Zeilen); Zeile {line} ist an falscher "
+        "Stelle: löschen, oder die Zeilen nach der Zeit sortieren",
+    ),
+    FaultPattern(
+        NOT_INCREASING + r"(?P<count>\d+) rows are out of order, the first in (?P<unit>line|row) "
+        r"(?P<line>\d+): .*",
+        "time does not increase: {after} after {before} ({rows} such rows); {count} rows are out of order, "
+        "the first in {unit} {line}: delete them, or sort the rows by time",
+        "die Zeit wächst nicht: {after} nach {before} ({rows} solche Zeilen); {count} Zeilen stehen "
+        "falsch, die erste ist Zeile {line}: löschen, oder die Zeilen nach der Zeit sortieren",
+    ),
+    FaultPattern(
         NOT_INCREASING + r"several .*",
         "time does not increase: {after} after {before} ({rows} such rows); several shots in one file need a "
         "column that numbers them: choose it in the form below",

@@ -16,6 +16,7 @@ from impactcell import campaign
 from impactcell.cli.app import run_verb
 from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements import read_tables
+from impactcell.web.texts.import_faults import page_fault
 from tests.unit.measurements.records import sampled, taps
 
 TIME, FORCE, PLACE = (values[::4] for values in sampled(taps((3000,), (18.9,))[0], np.random.default_rng(3)))
@@ -154,6 +155,25 @@ def test_times_that_go_back_are_those_of_several_shots(tmp_path: Path) -> None:
     told = refused(tmp_path, "\n".join([text().rstrip(), *text().splitlines()[1:]]), *VELOCITY)
     assert f"a.csv:{len(TIME) + 2}: time does not increase: 0 after {TIME[-1]:.9g} (1 such rows)" in told
     assert "several shots in one file need a column that numbers them (--column shot=NAME)" in told
+
+
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        ((50, 51), "line 53 is out of order: delete it, or sort the rows by their time"),
+        ((50, 120), "line 52 is out of order: delete it, or sort the rows by their time"),
+    ],
+)
+def test_a_row_in_a_wrong_place_is_no_other_shot(tmp_path: Path, rows: tuple[int, int], told: str) -> None:
+    """A row that changed its place with the next, and one that was written too early."""
+    lines, (here, there) = text().splitlines(), rows
+    lines.insert(here + 1, lines.pop(there + 1))
+    fault = refused(tmp_path, "\n".join(lines), *VELOCITY)
+    assert "(1 such rows); " + told in fault
+    assert "shot=" not in fault
+    english, german = (page_fault(fault, language)[1] for language in ("en", "de"))
+    assert english.endswith(told)
+    assert german.endswith("löschen, oder die Zeilen nach der Zeit sortieren")
 
 
 def test_what_is_given_for_all_shots_goes_before_a_column_that_cannot_be(tmp_path: Path) -> None:
