@@ -18,7 +18,7 @@ from impactcell.process.console import print_note
 from impactcell.records.uncertainty import TOLD_STDS, plus_minus, told_cycles_left
 from impactcell.settings.plausible_tap import FRICTION
 from impactcell.tracking.wear_batch import BatchKnowledge, TrackerSettings
-from impactcell.tracking.wear_batch.input_validation import LARGEST_FRICTION
+from impactcell.tracking.wear_batch.input_validation import LARGEST_FRICTION, SMALLEST_STD
 from impactcell.tracking.wear_batch.noise_scale import GUESSED_RELATIVE_STD
 
 FIGURES: Final = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
@@ -77,6 +77,8 @@ def track(
             f"{series}: only {tracked.used} of {len(file.observations)} cycles can be used, "
             f"it takes {FEWEST_CYCLES}{why}"
         )
+    if zeros := _zero_stds(file):
+        print_note(f"{series}: {zeros}")
     if file.unread:
         print_note(_unread(series, file))
     if all(math.isnan(observation.mu_s_std) for observation in file.observations):
@@ -98,6 +100,18 @@ def _doubt(file: SeriesFile) -> str:
     """Say that the mu_s of a file are hardly meant, as those in %; empty where they may be."""
     given = [seen.mu_s for seen in file.observations if math.isfinite(seen.mu_s)]
     return FRICTION.doubt(float(np.median(given))) if given else ""
+
+
+def _zero_stds(file: SeriesFile) -> str:
+    """Tell the rows whose standard deviation is 0, which the tracker takes for none; empty without such."""
+    zeros = [seen.cycle for seen in file.observations if seen.mu_s_std < SMALLEST_STD]
+    if not zeros:
+        return ""
+    told = "1 row" if len(zeros) == 1 else f"{len(zeros)} rows"
+    return (
+        f"mu_s_std is 0 in {told} of {len(file.observations)}, the first at cycle {zeros[0]}: no estimate is "
+        "so sure, it is taken for not stated there; leave it empty, or write what is known"
+    )
 
 
 def _unread(series: Path, file: SeriesFile) -> str:

@@ -509,3 +509,16 @@ def test_an_option_that_is_no_number_is_told_with_the_way_out(text, way_out):
     done = CliRunner(env={"COLUMNS": "300"}).invoke(app, ["track", "s.csv", "--limit", text])
     assert done.exit_code == 2
     assert f"Invalid value for '--limit': {text!r} is no number; {way_out}" in " ".join(done.output.split())
+
+
+def test_a_standard_deviation_of_0_is_told_with_the_rows_that_have_it(tmp_path, capsys):
+    path = write(tmp_path / "s.csv", truth(60, at=0))
+    lines = path.read_text().splitlines()
+    for at in (11, 31):
+        lines[at] = lines[at].rpartition(",")[0] + ",0"
+    path.write_text("\n".join(lines) + "\n")
+    track(path)
+    assert (
+        "mu_s_std is 0 in 2 rows of 60, the first at cycle 10: no estimate is so sure"
+        in capsys.readouterr().err
+    )
