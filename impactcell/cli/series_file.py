@@ -11,6 +11,7 @@ from pathlib import Path
 from impactcell.cell.series_replay import whole_number_fault
 from impactcell.errors import MeasurementError, SeriesError
 from impactcell.measurements.dialect import Dialect, decode, detect, split_cells
+from impactcell.measurements.lines_left_out import HEADER_AGAIN, left_out
 from impactcell.measurements.numbers import is_grouped, is_missing, parse_number
 from impactcell.measurements.text_layout import is_comment
 from impactcell.measurements.units import parse_unit
@@ -51,11 +52,14 @@ class SeriesFile:
         There is a column `batch`.
     unread : tuple of str
         Names of columns that are none of `COLUMNS`.
+    notes : tuple of str
+        What was left out, with its line.
     """
 
     observations: tuple[FrictionObservation, ...]
     has_batch: bool
     unread: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 def read_series(path: Path) -> SeriesFile:
@@ -74,11 +78,19 @@ def read_series(path: Path) -> SeriesFile:
     if head is None:
         raise SeriesError(f"{path}:1: empty; the first line is to be {FIRST_LINE}")
     delimiter, header = _header(f"{path}:{head + 1}", lines[head])
+    names = split_cells(lines[head], delimiter)
     _, decimal, _ = detect(lines[head + 1 :], Dialect(delimiter=delimiter))
     readings: list[FrictionObservation] = []
     faults: list[str] = []
     is_longer = False
-    for line, row in _rows(path, lines, head + 1, delimiter):
+    rows, notes = list(_rows(path, lines, head + 1, delimiter)), []
+    if len(rows) > 1 and len(rows[-1][1]) < len(header) <= len(rows[-2][1]):
+        line, cut = rows.pop()
+        notes.append(f"{path}:{line}: left out, {left_out(delimiter.join(cut), len(cut), len(header))}")
+    for line, row in rows:
+        if row == names:
+            faults.append(f"{path}:{line}: {HEADER_AGAIN}")
+            continue
         if not (readings or faults) and _is_line_of_units(header, row):
             faults.append(f"{path}:{line}: a line of units; leave it out")
             continue
@@ -96,7 +108,7 @@ def read_series(path: Path) -> SeriesFile:
     if not readings:
         raise SeriesError(f"{path}:{head + 2}: no cycles after the header")
     unread = tuple(name for name in header if name and name not in COLUMNS)
-    return SeriesFile(tuple(readings), "batch" in header, unread)
+    return SeriesFile(tuple(readings), "batch" in header, unread, tuple(notes))
 
 
 def _lines(path: Path) -> list[str]:

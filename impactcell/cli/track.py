@@ -77,6 +77,8 @@ def track(
             f"{series}: only {tracked.used} of {len(file.observations)} cycles can be used, "
             f"it takes {FEWEST_CYCLES}{why}"
         )
+    for note in file.notes:
+        print_note(note)
     if zeros := _zero_stds(file):
         print_note(f"{series}: {zeros}")
     if file.unread:

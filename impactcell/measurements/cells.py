@@ -1,5 +1,6 @@
 """Cells of text as numbers; those that are none are told with their lines, the first of them in full."""
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -18,21 +19,30 @@ class LineFaults:
 
     def __init__(self, source: str) -> None:
         self._source = source
-        self._told: list[str] = []
+        self._told: dict[str, str] = {}
+        self._alike: Counter[str] = Counter()
         self._count = 0
 
-    def add(self, line: int, message: str) -> None:
-        """Tell what is wrong in a line."""
+    def add(self, line: int, message: str, kind: str = "") -> None:
+        """Tell what is wrong in a line; of faults of one kind the first alone, with how many there are."""
         self._count += 1
-        if len(self._told) < MAX_FAULTS_TOLD:
-            self._told.append(f"{self._source}:{line}: {message}")
+        told = f"{self._source}:{line}: {message}"
+        kind = kind or told
+        if kind in self._told or len(self._told) < MAX_FAULTS_TOLD:
+            self._told.setdefault(kind, told)
+            self._alike[kind] += 1
 
     def raise_any(self) -> None:
         """Raise `MeasurementError` with what has been told, if anything."""
         if self._told:
-            rest = self._count - len(self._told)
+            rest = self._count - self._alike.total()
             more = [f"{self._source}: and {rest} more faults"] if rest else []
-            raise MeasurementError("\n".join(self._told + more))
+            told = [self._with_count(kind, first) for kind, first in self._told.items()]
+            raise MeasurementError("\n".join(told + more))
+
+    def _with_count(self, kind: str, first: str) -> str:
+        others = self._alike[kind] - 1
+        return f"{first} (and {others} more like this)" if others else first
 
 
 def numbers_of(

@@ -3,6 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from impactcell.measurements.dialect import (
 )
 from impactcell.measurements.labview import is_labview, read_labview
 from impactcell.measurements.limits import Limits
+from impactcell.measurements.lines_left_out import HEADER_AGAIN, left_out
 from impactcell.measurements.moments import read_moments
 from impactcell.measurements.names_alone import refuse_names_alone
 from impactcell.measurements.table import Lines, MeasuredColumn, Table, unique_names
@@ -50,13 +52,15 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
     layout = find_layout(lines, source, delimiter, decimal)
     limits.check_shape(source, len(lines) - layout.first_row, len(layout.names))
     watch = ThousandsWatch(decimal)
-    columns, numbers = _Rows(source, lines, layout, delimiter, decimal, watch).read()
+    rows = _Rows(source, lines, layout, replace(given, delimiter=delimiter, decimal=decimal), watch)
+    columns, numbers = rows.read()
     if given.decimal is None:
         watch.refuse(source, layout.names)
     notes = [how, f"encoding {encoding.removesuffix('-sig')}", _where(layout)]
-    skipped = len(lines) - layout.first_row - len(numbers)
+    skipped = len(lines) - layout.first_row - len(numbers) - len(rows.left_out)
     if skipped:
         notes.append(f"{skipped} blank or comment lines left out")
+    notes += rows.left_out
     table = Table(
         source,
         _kept(layout, columns),
@@ -136,17 +140,17 @@ class _Rows:
         source: str,
         lines: Sequence[str],
         layout: Layout,
-        delimiter: str,
-        decimal: str,
+        dialect: Dialect,
         watch: ThousandsWatch,
     ) -> None:
         self._lines = lines
         self._layout = layout
-        self._delimiter = delimiter
-        self._decimal = decimal
+        self._delimiter, self._decimal = dialect.delimiter or ",", dialect.decimal or "."
         self._watch = watch
         self._width = len(layout.names)
         self._faults = LineFaults(source)
+        self._header = None if layout.header_line is None else lines[layout.header_line - 1].strip()
+        self.left_out: list[str] = []
 
     def read(self) -> tuple[list[Samples | list[str]], Lines]:
         """Columns, and the line of each row.
@@ -188,10 +192,14 @@ class _Rows:
     def _cells(self, chunk: list[tuple[int, str]]) -> list[tuple[int, list[str]]]:
         rows = []
         for number, line in chunk:
+            if line.strip() == self._header:
+                self._faults.add(number, HEADER_AGAIN, HEADER_AGAIN)
+                continue
             cells = split_cells(line, self._delimiter)
             if len(cells) != self._width:
                 if number == len(self._lines) and len(cells) < self._width:
-                    continue  # a recording that was cut off in the middle of a line
+                    self.left_out.append(f"line {number} left out, {left_out(line, len(cells), self._width)}")
+                    continue
                 self._faults.add(number, f"{len(cells)} cells where the table has {self._width}")
                 continue
             rows.append((number, cells))

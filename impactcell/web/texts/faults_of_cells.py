@@ -9,6 +9,11 @@ CELL: Final = r"(?P<mark>['\"])(?P<cell>.*)(?P=mark)"
 
 FAULTS_OF_CELLS: Final = (
     FaultPattern(
+        r"the header again; delete the line.*",
+        "the header again; delete the line",
+        "noch einmal die Kopfzeile; die Zeile löschen",
+    ),
+    FaultPattern(
         r"has a JSON object in each line, which is not read; .*",
         "has a JSON object in each line, which is not read; write them as one list, [{{...}}, {{...}}], in a "
         "file that ends in .json",

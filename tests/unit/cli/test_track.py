@@ -257,7 +257,7 @@ def test_a_limit_that_is_not_reached_is_told_in_words(tmp_path, capsys):
         ("cycle,mu_s\n1,%\n", ":2: mu_s `%` is not a number"),
         ("cycle,mu_s,mu_s\n1,0.2,0.2\n", ":1: column `mu_s` is there 2 times"),
         ("cycle,mu_s,mu_s_std\n", ":2: no cycles"),
-        ("cycle,mu_s,mu_s_std\n1,0.2,0.1\n2,0.2\n", ":3: 2 cells, but the header has 3"),
+        ("cycle,mu_s,mu_s_std\n1,0.2,0.1\n2,0.2\n3,0.2,0.1\n", ":3: 2 cells, but the header has 3"),
         ("cycle,mu_s,mu_s_std\n1.5,0.2,0.1\n", ":2: cycle `1.5` is not a whole number"),
         ("cycle,mu_s,mu_s_std\nx,0.2,0.1\n", ":2: cycle `x` is not a whole number"),
         (
@@ -522,3 +522,27 @@ def test_a_standard_deviation_of_0_is_told_with_the_rows_that_have_it(tmp_path, 
         "mu_s_std is 0 in 2 rows of 60, the first at cycle 10: no estimate is so sure"
         in capsys.readouterr().err
     )
+
+
+@pytest.mark.parametrize(
+    ("last", "told"),
+    [("60,0.2", "cut off after 2 of 3 cells: '60,0.2'"), ("the end\n", "no row of the table: 'the end'")],
+)
+def test_a_last_line_that_is_no_row_is_left_out_and_told(tmp_path, capsys, last, told):
+    path = write(tmp_path / "s.csv", truth(60, at=0))
+    expected = run(capsys, path)
+    path.write_text(path.read_text() + last)
+    track(path, as_json=True)
+    seen = capsys.readouterr()
+    assert json.loads(seen.out) == expected
+    assert f"{path}:62: left out, " in seen.err
+    assert told in seen.err
+
+
+def test_a_header_that_comes_again_is_one_fault(tmp_path):
+    path = write(tmp_path / "s.csv", truth(60, at=0))
+    text = path.read_text()
+    path.write_text(text + text)
+    with pytest.raises(SeriesError) as error:
+        track(path)
+    assert str(error.value) == f"{path}:62: the header again; delete the line"

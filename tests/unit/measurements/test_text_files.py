@@ -417,3 +417,31 @@ def test_a_trend_of_a_plc_with_days_and_clock_times_apart(tmp_path: Path) -> Non
     time = table.column("Time")
     assert time is not None
     np.testing.assert_allclose(time.values, 1e-3 * np.arange(300), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("last", "told"),
+    [
+        ("20", "line 22 left out, cut off after 1 of 2 cells: '20'"),
+        (f"End of {'a ' * 30}measurement\n", "the last line, and no row of the table: 'End of" + " a" * 17),
+    ],
+)
+def test_a_last_line_that_is_left_out_is_named(tmp_path: Path, last: str, told: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t;F\n" + rows(20) + last, encoding="utf-8")
+    table = one(path)
+    assert len(table) == 20
+    assert told in table.notes[-1]
+    assert not any("blank or comment" in note for note in table.notes)
+
+
+def test_a_header_that_comes_again_is_one_fault(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t;F\n" + rows(20) + "t;F\n" + rows(20), encoding="utf-8")
+    with pytest.raises(MeasurementError) as caught:
+        one(path)
+    assert str(caught.value) == f"{path}:22: the header again; delete the line"
+    path.write_text(("t;F\n" + rows(20)) * 4, encoding="utf-8")
+    with pytest.raises(MeasurementError) as caught:
+        one(path)
+    assert str(caught.value) == f"{path}:22: the header again; delete the line (and 2 more like this)"
