@@ -72,7 +72,8 @@ def import_files(
             f"{len(files)} files are more than the {limits.files} that are imported at once"
         )
     _check_distinct(files)
-    tables = [table for file in files for table in read_tables(file, limits, options.dialect)]
+    dialect = replace(options.dialect, lost=given.lost)
+    tables = [table for file in files for table in read_tables(file, limits, dialect)]
     mapping = guess(tables, given)
     if not as_json and not is_quiet():
         _print_guess(tables, mapping)

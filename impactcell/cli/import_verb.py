@@ -42,7 +42,8 @@ def import_files(
         Path | None,
         typer.Option(
             metavar="MAP.yaml",
-            help="Says the same: columns, units, gains, signs, delays, constants, excitation, trigger.",
+            help="Says the same: columns, units, gains, signs, delays, constants, excitation, trigger; "
+            "and lost: words for a value that was lost, as [OVER, Error].",
         ),
     ] = None,
     excitation: Annotated[str | None, typer.Option(help="tap, free_slide or driven.")] = None,

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 
 import numpy as np
 
@@ -10,6 +11,8 @@ from impactcell.measurements.faults import MAX_FAULTS_TOLD
 from impactcell.measurements.numbers import parse_number, plain_numbers
 from impactcell.records import Samples
 
+LONGEST_WORD = 20
+"""Signs of the longest word that a recorder may write for a value that was lost."""
 CHUNK_ROWS = 20_000
 """Rows whose cells are held as text at a time: some 10 MB."""
 
@@ -46,22 +49,40 @@ class LineFaults:
 
 
 def numbers_of(
-    cells: list[str], lines: Sequence[int], name: str, decimal: str, faults: LineFaults
+    cells: list[str],
+    lines: Sequence[int],
+    name: str,
+    decimal: str,
+    faults: LineFaults,
+    lost: AbstractSet[str] | None = None,
 ) -> Samples:
-    """Give the numbers of the cells of a column, nan where one is empty or, with a fault, no number."""
+    """Give the numbers of the cells of a column, nan where one is empty or, with a fault, no number.
+
+    Parameters
+    ----------
+    lost : set of str or None
+        Words, in lower case, that were said to stand for no value too; None where none can be said.
+    """
+    if lost:
+        cells = ["" if cell.strip().lower() in lost else cell for cell in cells]
     values = plain_numbers(cells, decimal)
     if values is None:
         values = np.full(len(cells), np.nan)
         for row, cell in enumerate(cells):
             value = parse_number(cell, decimal)
             if value is None:
-                faults.add(lines[row], f"column {name!r}: {_no_number(cell, decimal)}")
+                word = "" if any(map(str.isdigit, cell)) else cell.strip().lower()
+                way_out = _lost_words(word) if lost is not None else ""
+                faults.add(lines[row], f"column {name!r}: {_no_number(cell, decimal)}{way_out}", word)
             else:
                 values[row] = value
-    for row in np.flatnonzero(np.isinf(values))[:1].tolist():
+    for row in np.flatnonzero(np.isinf(values)).tolist():
+        way_out = _lost_words(cells[row].strip().lower()) if lost is not None else ""
         faults.add(
             lines[row],
-            f"column {name!r} is infinite; write the number, or leave the cell empty where there is none",
+            f"column {name!r} is infinite; write the number, or leave the cell empty where there is none"
+            f"{way_out}",
+            "infinite",
         )
     return values
 
@@ -72,3 +93,10 @@ def _no_number(cell: str, decimal: str) -> str:
     is_one = parse_number(cell, "," if decimal == "." else ".") is not None
     way = f"say --decimal {other} if that is its mark, " if is_one else ""
     return f"{cell[:40]!r} is not a number with decimal {mark}; {way}correct the cell, or leave it empty"
+
+
+def _lost_words(word: str) -> str:
+    """Say how a word is said to stand for a value that was lost."""
+    if not 0 < len(word) <= LONGEST_WORD:
+        return ""
+    return f", or say that it stands for none with `lost: [{word!r}]` in a --mapping file"

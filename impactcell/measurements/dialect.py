@@ -40,11 +40,14 @@ class Dialect:
         `.` or `,`.
     encoding : str or None
         As Python calls it.
+    lost : frozenset of str
+        Words, in lower case, that stand for a value that was lost.
     """
 
     delimiter: str | None = None
     decimal: str | None = None
     encoding: str | None = None
+    lost: frozenset[str] = frozenset()
 
 
 def decode(content: bytes, source: str, encoding: str | None) -> tuple[str, str]:

@@ -37,7 +37,7 @@ _WITH_UNIT = re.compile(r"([+-]?[\d.]+(?:[eE][+-]?\d+)?)\s*(.*)")
 LONGEST_DELAY_S = 1.0
 """Longest time [s] that a channel may be moved: beyond it the channels are of different events."""
 SECTIONS = ("columns", "units", "gains", "signs", "delays", "constants")
-"""Blocks of a mapping file; beside them `excitation` and `trigger`."""
+"""Blocks of a mapping file; beside them `excitation`, `trigger` and `lost`."""
 
 
 def read_given(
@@ -53,7 +53,7 @@ def read_given(
     MeasurementError
         Every name and value that is not known.
     """
-    sections, from_file, others = _read(file) if file is not None else ({}, {}, {})
+    sections, from_file, others, lost = _read(file) if file is not None else ({}, {}, {}, frozenset())
     for section in SECTIONS:
         for text in said.get(section, ()):
             name, equals, value = text.partition("=") if section != "units" else _split_last(text)
@@ -89,6 +89,7 @@ def read_given(
             for key, text in sections.get("delays", {}).items()
             if (q := _quantity(key, faults))
         },
+        lost,
     )
     if faults:
         raise MeasurementError("\n".join(faults))
@@ -99,19 +100,22 @@ def _split_last(text: str) -> tuple[str, str, str]:
     return text.rpartition("=")
 
 
-def _read(file: Path) -> tuple[dict[str, dict[str, str]], dict[str, str], dict[str, ColumnMeaning]]:
-    """Blocks of a file, excitation and trigger, and the columns that are covariates or ignored."""
+def _read(
+    file: Path,
+) -> tuple[dict[str, dict[str, str]], dict[str, str], dict[str, ColumnMeaning], frozenset[str]]:
+    """Blocks of a file, excitation and trigger, columns that are covariates or ignored, lost words."""
     try:
         content, positions = yaml_loader.load(file)
     except SettingsError as error:
         raise MeasurementError(str(error)) from error
-    known = (*SECTIONS, "excitation", "trigger")
+    known = (*SECTIONS, "excitation", "trigger", "lost")
     if not isinstance(content, dict):
         raise MeasurementError(f"{file}: has to hold blocks {', '.join(SECTIONS)}, excitation and trigger")
     faults: list[str] = []
     sections: dict[str, dict[str, str]] = {}
     single: dict[str, str] = {}
     others: dict[str, ColumnMeaning] = {}
+    lost: frozenset[str] = frozenset()
 
     def fault(message: str, *location: str | int) -> None:
         faults.append(yaml_loader.format_error(file, positions.key(location), message))
@@ -119,6 +123,11 @@ def _read(file: Path) -> tuple[dict[str, dict[str, str]], dict[str, str], dict[s
     for key, value in content.items():
         if key not in known:
             fault(f"unknown key {key!r}; known: {', '.join(known)}", key)
+        elif key == "lost":
+            words = value if isinstance(value, list) else [value]
+            if not all(isinstance(word, str | float) for word in words):
+                fault("lost has to be a list of words, as [OVER, Error]", key)
+            lost = frozenset(str(word).strip().lower() for word in words)
         elif key not in SECTIONS:
             single[key] = str(value)
         elif not isinstance(value, dict):
@@ -135,7 +144,7 @@ def _read(file: Path) -> tuple[dict[str, dict[str, str]], dict[str, str], dict[s
                     sections.setdefault(key, {})[str(name)] = str(item)
     if faults:
         raise MeasurementError("\n".join(faults))
-    return sections, single, others
+    return sections, single, others, lost
 
 
 def _quantity(key: str, faults: list[str]) -> ColumnMeaning | None:

@@ -37,6 +37,8 @@ class Given:
         What the signal in the column of a channel stands for.
     delays : mapping
         How much later than it happened a channel was recorded [s].
+    lost : frozenset of str
+        Words, in lower case, that stand for a value that was lost.
     """
 
     columns: AbstractMapping[ColumnMeaning, str] = field(default_factory=dict)
@@ -48,6 +50,7 @@ class Given:
     others: AbstractMapping[str, ColumnMeaning] = field(default_factory=dict)
     gains: AbstractMapping[ColumnMeaning, Gain] = field(default_factory=dict)
     delays: AbstractMapping[ColumnMeaning, float] = field(default_factory=dict)
+    lost: frozenset[str] = frozenset()
 
 
 def without_use(assignments: Sequence[Assignment], given: Given, tables: Sequence[Table]) -> list[str]:

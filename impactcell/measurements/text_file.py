@@ -49,7 +49,7 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
         return read_scope_export(source, lines, limits, given.decimal)
     refuse_names_alone(lines, source)
     delimiter, decimal, how = detect([line for line in lines if not is_comment(line)], given)
-    layout = find_layout(lines, source, delimiter, decimal)
+    layout = find_layout(lines, source, delimiter, decimal, given.lost)
     limits.check_shape(source, len(lines) - layout.first_row, len(layout.names))
     watch = ThousandsWatch(decimal)
     rows = _Rows(source, lines, layout, replace(given, delimiter=delimiter, decimal=decimal), watch)
@@ -146,6 +146,7 @@ class _Rows:
         self._lines = lines
         self._layout = layout
         self._delimiter, self._decimal = dialect.delimiter or ",", dialect.decimal or "."
+        self._lost = dialect.lost
         self._watch = watch
         self._width = len(layout.names)
         self._faults = LineFaults(source)
@@ -211,7 +212,9 @@ class _Rows:
             return cells
         self._watch.look(place, cells)
         name = self._layout.names[place] or f"column {place + 1}"
-        return numbers_of(cells, [number for number, _ in rows], name, self._decimal, self._faults)
+        return numbers_of(
+            cells, [number for number, _ in rows], name, self._decimal, self._faults, self._lost
+        )
 
 
 def _kept(layout: Layout, columns: list[Samples | list[str]]) -> tuple[MeasuredColumn, ...]:

@@ -3,6 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
 from impactcell.errors import MeasurementError
@@ -61,15 +62,17 @@ class Layout:
     attributes: dict[str, str]
 
 
-def find_layout(lines: Sequence[str], source: str, delimiter: str, decimal: str) -> Layout:
-    """Find the table in the lines of a file.
+def find_layout(
+    lines: Sequence[str], source: str, delimiter: str, decimal: str, lost: AbstractSet[str] = frozenset()
+) -> Layout:
+    """Find the table in the lines of a file, whose cells may hold words for lost values, in lower case.
 
     Raises
     ------
     MeasurementError
         There is no table of numbers, or its header does not fit its rows.
     """
-    width, numeric = _body(lines, delimiter, decimal)
+    width, numeric = _body(lines, delimiter, decimal, lost)
     if not numeric:
         raise MeasurementError(
             f"{source}: no table of numbers was found; say --delimiter and --decimal if there is one"
@@ -170,7 +173,9 @@ def is_comment(line: str) -> bool:
     return not text or (text.startswith(COMMENT_SIGNS) and not NO_VALUE.match(text))
 
 
-def _body(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, frozenset[int]]:
+def _body(
+    lines: Sequence[str], delimiter: str, decimal: str, lost: AbstractSet[str]
+) -> tuple[int, frozenset[int]]:
     """Cells of a row, and the columns that are numbers, from lines in the later part of the file."""
     filled = [line for line in lines if not is_comment(line)]
     rows = [split_cells(line, delimiter) for line in later_lines(filled)]
@@ -182,13 +187,18 @@ def _body(lines: Sequence[str], delimiter: str, decimal: str) -> tuple[int, froz
     spread = [split_cells(line, delimiter) for line in filled[:: len(filled) // HEAD_LINES + 1]]
     numeric = set()
     for column in range(width):
-        cells = [row[column] for row in rows if not is_missing(row[column])]
+        cells = [row[column] for row in rows if _is_there(row[column], lost)]
         if not cells:  # a channel that ended before the others
-            cells = [row[column] for row in spread if len(row) == width and not is_missing(row[column])]
+            cells = [row[column] for row in spread if len(row) == width and _is_there(row[column], lost)]
         numbers = sum(parse_number(cell, decimal) is not None for cell in cells)
         if cells and numbers >= NUMERIC_SHARE * len(cells):
             numeric.add(column)
     return width, frozenset(numeric)
+
+
+def _is_there(cell: str, lost: AbstractSet[str]) -> bool:
+    """Whether a cell stands for a value, be it a number or not."""
+    return not is_missing(cell) and cell.lower() not in lost
 
 
 def _first_row(

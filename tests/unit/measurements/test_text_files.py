@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from impactcell.errors import MeasurementError
 from impactcell.measurements import Dialect, Limits, Table, read_tables
+from impactcell.measurements.given import read_given
 from impactcell.measurements.sampling_step import sampling_step_s
 
 DIALECTS = [(";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), ("|", ","), (" ", "."), (" ", ",")]
@@ -445,3 +446,32 @@ def test_a_header_that_comes_again_is_one_fault(tmp_path: Path) -> None:
     with pytest.raises(MeasurementError) as caught:
         one(path)
     assert str(caught.value) == f"{path}:22: the header again; delete the line (and 2 more like this)"
+
+
+def test_a_word_for_a_lost_value_is_told_once_and_can_be_said(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t;F\n" + rows(40) + "41;OVER\n42;Error\n" * 12 + rows(400), encoding="utf-8")
+    with pytest.raises(MeasurementError) as caught:
+        one(path)
+    first, second = str(caught.value).splitlines()
+    assert first.startswith(f"{path}:42: column 'F': 'OVER' is not a number")
+    assert first.endswith("with `lost: ['over']` in a --mapping file (and 11 more like this)")
+    assert second.startswith(f"{path}:43: column 'F': 'Error' is not a number")
+    file = tmp_path / "map.yaml"
+    file.write_text("lost: [over, Error]\n")
+    (table,) = read_tables(path, dialect=Dialect(lost=read_given({}, file).lost))
+    assert int(np.isnan(table.columns[1].values).sum()) == 24
+    path.write_text("t;F\n" + rows(40) + "41;OVER\n42;Error\n" * 40, encoding="utf-8")
+    (table,) = read_tables(path, dialect=Dialect(lost=read_given({}, file).lost))
+    assert int(np.isnan(table.columns[1].values).sum()) == 80, "a column of numbers, however many are lost"
+    path.write_text("t;F\n" + rows(400) + "401;inf\n" * 5, encoding="utf-8")
+    with pytest.raises(
+        MeasurementError, match=r"csv:402: column 'F' is infinite; .* \(and 4 more like this\)$"
+    ):
+        one(path)
+    file.write_text("lost: inf\n")
+    (table,) = read_tables(path, dialect=Dialect(lost=read_given({}, file).lost))
+    assert int(np.isnan(table.columns[1].values).sum()) == 5
+    file.write_text("lost: {a: b}\n")
+    with pytest.raises(MeasurementError, match="lost has to be a list of words"):
+        read_given({}, file)
