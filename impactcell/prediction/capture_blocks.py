@@ -15,7 +15,15 @@ from impactcell.prediction.block_averaging import (
     POSITION_BLOCK_S,
     average_blocks,
 )
-from impactcell.prediction.linearised_model import LATEST_ONSET, LinearisedModel, RecorderStd
+from impactcell.prediction.linearised_model import (
+    LATEST_ONSET,
+    MASS,
+    PARAMETERS,
+    VELOCITY,
+    LinearisedModel,
+    RecorderStd,
+    with_parameters,
+)
 from impactcell.records import AT_THE_HALT_S, Capture, Samples
 
 KINK_SPAN_S = 1.5e-4
@@ -44,6 +52,25 @@ def tap_input(capture: Capture) -> TapInput:
         start_m=capture.start_m,
         dwell_s=capture.dwell_s,
     )
+
+
+def halts_in_contact(capture: Capture, plant: Plant, theta: Samples) -> bool:
+    """Whether the actuator ends its stroke before contact is lost, in a tap with these parameters.
+
+    Only these tell: by a velocity as it was told the two may be in the other order, where they are close.
+    """
+    tap = tap_input(capture)
+    if len(theta) > PARAMETERS:
+        mass_kg = tap.mass_kg * math.exp(capture.mass_std * theta[MASS])
+        velocity_m_s = tap.velocity_m_s * math.exp(capture.velocity_std * theta[VELOCITY])
+        tap = replace(tap, mass_kg=mass_kg, velocity_m_s=velocity_m_s)
+    touches = True
+    for event in simulate_tap(with_parameters(plant, theta), tap).events:
+        if event.kind is TapEventKind.HALT:
+            return touches
+        if event.kind in (TapEventKind.SEPARATION, TapEventKind.CONTACT):
+            touches = event.kind is TapEventKind.CONTACT
+    return False
 
 
 def recorder_std_of(capture: Capture) -> RecorderStd:

@@ -12,8 +12,8 @@ from impactcell.features import (
     SlideFeatures,
     extract,
     impulse_balance,
-    required,
 )
+from impactcell.prediction.capture_blocks import halts_in_contact
 from impactcell.prediction.equations import beyond_calibration, by_distance, by_force, combined, out_of_range
 from impactcell.prediction.linearised_model import FORCE_SCALE, MASS, PARAMETERS, POSITION_SCALE, VELOCITY
 from impactcell.prediction.mass_interpolation import interpolate_mass
@@ -151,7 +151,7 @@ def _from_waveform(
 ) -> tuple[Coefficient, Coefficient, float]:
     """Coefficients as published, with a warning for a tap outside the calibration or unlike the model."""
     capture, mu_k_std = features.capture, waveform.mu_k_std
-    if _halts_in_contact(features):
+    if capture.position_scale_std and halts_in_contact(capture, model.plant, waveform.theta):
         # The place of the halt tells the position's scale no better than anybody knows the stroke.
         mu_k_std = max(mu_k_std, capture.position_scale_std * waveform.mu_k)
     warnings = [beyond_calibration(model, capture, waveform.mu_s), *_told_otherwise(capture, waveform)]
@@ -166,12 +166,6 @@ def _from_waveform(
     own_variance = waveform.mu_k_std**2 - waveform.mu_k_common_std**2
     mu_k = Coefficient(waveform.mu_k, mu_k_std, Quality.GOOD, "", math.sqrt(mu_k_std**2 - own_variance))
     return _with_warnings(mu_s, *warnings), _with_warnings(mu_k, *warnings), waveform.gap
-
-
-def _halts_in_contact(features: Features) -> bool:
-    """Whether the actuator is at the end of its stroke before contact is lost."""
-    capture = features.capture
-    return required(features.separation).value * capture.velocity_m_s > capture.stroke_m
 
 
 def _told_otherwise(capture: Capture, waveform: WaveformFit) -> list[str]:

@@ -105,6 +105,19 @@ def test_a_stroke_that_is_told_a_little_wrong_bends_no_mu_k(velocity_m_s: float,
         assert own_std(mu_k) < 2e-3 * mu_k.value
 
 
+@pytest.mark.parametrize("longer", [0.998, 1.002])
+def test_a_velocity_told_too_small_does_not_hide_that_a_tap_halts_in_contact(longer: float) -> None:
+    """By it the halt came later: mu_k took its scale from the stroke as if that were exact, Good."""
+    tap, stroke_m = Tap(0.0845, stroke_m=longer * 1.5e-3), 1.5e-3
+    separation_s = tap.motion().separation_s
+    assert 0.99 * tap.velocity_m_s * separation_s < stroke_m < tap.velocity_m_s * separation_s
+    seen = told(tap.capture(np.random.default_rng(4), force_hz=1e5), "velocity", 0.99)
+    mu_k = estimate(as_recorded(replace(seen, stroke_m=stroke_m)), MODEL).mu_k
+    assert mu_k.quality is Quality.GOOD
+    assert abs(mu_k.value - tap.mu_k) < 2.0 * mu_k.std
+    assert mu_k.std >= POSITION_SCALE_STD * mu_k.value
+
+
 def own_std(of: Coefficient) -> float:
     """Give the part of a standard deviation that other taps do not share."""
     return math.sqrt(of.std**2 - of.common_std**2)
