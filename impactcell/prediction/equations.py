@@ -12,8 +12,10 @@ from scipy.optimize import brentq
 
 from impactcell.errors import NegativeRootError, PredictionError
 from impactcell.features import MeasuredFeature
+from impactcell.prediction.linearised_model import EXACT, RecorderStd
 from impactcell.prediction.mass_interpolation import MassInterpolation
 from impactcell.prediction.model import Model, Predictor, Sensitivity
+from impactcell.prediction.told_errors import distance_shifts, force_shifts
 from impactcell.records import MM_PER_MIN, Capture, Coefficient, Quality
 
 MIN_MU_S = 1e-3
@@ -24,9 +26,15 @@ right in all but noise and scatter, those beyond were off by 6 % and more, as th
 
 
 def by_force(
-    model: Model, mixed: MassInterpolation, velocity_m_s: float, peak: MeasuredFeature
+    model: Model,
+    mixed: MassInterpolation,
+    velocity_m_s: float,
+    peak: MeasuredFeature,
+    told_std: RecorderStd = EXACT,
 ) -> Coefficient:
     """Equation (4): mu_s = (F_p - velocity_n_s_per_m v) / friction_n.
+
+    `told_std` is how well mass, velocity and scales are known, here and in (5) and (6).
 
     Raises
     ------
@@ -43,8 +51,8 @@ def by_force(
     sensitivity = _sensitivity(mixed, lambda predictor: predictor.force_sensitivity)
     rms = mixed.mean(lambda predictor: predictor.force.rms)
     calibration_std = value * _relative_calibration_std(model, sensitivity)
-    stds = math.hypot(peak.std / slope, rms, calibration_std), math.hypot(rms, calibration_std)
-    return _graded(model, mixed, velocity_m_s, value, *stds)
+    common_std = math.hypot(rms, calibration_std, *force_shifts(mixed, value, velocity_m_s, told_std))
+    return _graded(model, mixed, velocity_m_s, value, math.hypot(peak.std / slope, common_std), common_std)
 
 
 def _way_out(model: Model, suspects: str) -> str:
@@ -55,7 +63,11 @@ def _way_out(model: Model, suspects: str) -> str:
 
 
 def by_distance(
-    model: Model, mixed: MassInterpolation, velocity_m_s: float, slide: MeasuredFeature
+    model: Model,
+    mixed: MassInterpolation,
+    velocity_m_s: float,
+    slide: MeasuredFeature,
+    told_std: RecorderStd = EXACT,
 ) -> Coefficient:
     """Equation (5): mu_s = limit - sqrt((d - offset_m u^offset_power) / (square_m u^square_power)).
 
@@ -92,8 +104,9 @@ def by_distance(
     sensitivity = _sensitivity(mixed, lambda predictor: predictor.distance_sensitivity)
     rms = mixed.mean(lambda predictor: predictor.distance.rms)
     calibration_std = value * _relative_calibration_std(model, sensitivity)
-    std = math.hypot(slide.std / max(slope, 1e-12), rms, calibration_std)
-    return _graded(model, mixed, velocity_m_s, value, std, math.hypot(rms, calibration_std))
+    common_std = math.hypot(rms, calibration_std, *distance_shifts(mixed, value, velocity_m_s, told_std))
+    std = math.hypot(slide.std / max(slope, 1e-12), common_std)
+    return _graded(model, mixed, velocity_m_s, value, std, common_std)
 
 
 def combined(
@@ -102,6 +115,7 @@ def combined(
     velocity_m_s: float,
     force: tuple[Coefficient, MeasuredFeature],
     slide: tuple[Coefficient, MeasuredFeature],
+    told_std: RecorderStd = EXACT,
 ) -> Coefficient:
     """Equation (6): mu_s = mu_force w_F + mu_dist w_d, weighted by the gradients of both figures.
 
@@ -132,8 +146,10 @@ def combined(
         math.hypot(distance.std / max(slope, 1e-12), forms[1]),
     )
     calibration_std = value * _relative_calibration_std(model, sensitivity)
-    std = math.hypot(weight * stds[0], distance_weight * stds[1], calibration_std)
-    common_std = math.hypot(weight * forms[0], distance_weight * forms[1], calibration_std)
+    shifts = weight * force_shifts(mixed, mu_force.value, velocity_m_s, told_std)
+    shifts += distance_weight * distance_shifts(mixed, mu_dist.value, velocity_m_s, told_std)
+    std = math.hypot(weight * stds[0], distance_weight * stds[1], calibration_std, *shifts)
+    common_std = math.hypot(weight * forms[0], distance_weight * forms[1], calibration_std, *shifts)
     found = _graded(model, mixed, velocity_m_s, value, std, common_std)
     between = Sensitivity(
         of_force.stiffness - of_distance.stiffness,

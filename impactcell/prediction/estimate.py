@@ -13,7 +13,7 @@ from impactcell.features import (
     extract,
     impulse_balance,
 )
-from impactcell.prediction.capture_blocks import halts_in_contact
+from impactcell.prediction.capture_blocks import halts_in_contact, recorder_std_of
 from impactcell.prediction.equations import beyond_calibration, by_distance, by_force, combined, out_of_range
 from impactcell.prediction.linearised_model import FORCE_SCALE, MASS, PARAMETERS, POSITION_SCALE, VELOCITY
 from impactcell.prediction.mass_interpolation import interpolate_mass
@@ -110,7 +110,7 @@ def _by_equations(
 ) -> _Equations:
     """mu_s by (4), (5) and (6) from two features, each with what is wrong with it."""
     (peak_force, force_fault), (sliding_distance, slide_fault) = peak, distance
-    velocity_m_s = capture.velocity_m_s
+    velocity_m_s, told_std = capture.velocity_m_s, recorder_std_of(capture)
     try:
         coefficients = interpolate_mass(model, capture.mass_kg, velocity_m_s)
         warning = out_of_range(model, coefficients, velocity_m_s, math.nan, capture.stroke_m)
@@ -119,13 +119,13 @@ def _by_equations(
     mu_force, mu_distance = Coefficient(reason=force_fault), Coefficient(reason=slide_fault)
     try:
         if math.isfinite(peak_force.value):
-            mu_force = by_force(model, coefficients, velocity_m_s, peak_force)
+            mu_force = by_force(model, coefficients, velocity_m_s, peak_force, told_std)
             mu_force = _with_warnings(mu_force, warning, force_fault)
     except PredictionError as fault:
         mu_force = Coefficient(reason=str(fault))
     try:
         if math.isfinite(sliding_distance.value):
-            mu_distance = by_distance(model, coefficients, velocity_m_s, sliding_distance)
+            mu_distance = by_distance(model, coefficients, velocity_m_s, sliding_distance, told_std)
             mu_distance = _with_warnings(mu_distance, warning, slide_fault)
     except PredictionError as fault:
         mu_distance = Coefficient(reason=str(fault))
@@ -133,7 +133,7 @@ def _by_equations(
         faults = [mu_s.reason for mu_s in (mu_force, mu_distance) if mu_s.quality is Quality.BAD]
         return _Equations(mu_force, mu_distance, Coefficient(reason="; ".join(dict.fromkeys(faults))))
     both = (mu_force, peak_force), (mu_distance, sliding_distance)
-    mu_combined = combined(model, coefficients, velocity_m_s, *both)
+    mu_combined = combined(model, coefficients, velocity_m_s, *both, told_std)
     faults = [fault for fault in (force_fault, slide_fault) if fault]
     return _Equations(mu_force, mu_distance, _with_warnings(mu_combined, warning, "; ".join(faults)))
 
