@@ -216,7 +216,6 @@ async def test_a_port_in_use_is_told_with_the_line_that_names_it(
         service = Service(read_cells([path]))
         with pytest.raises(SettingsError, match="Address already in use") as caught:
             await service.run(asyncio.Event())
-    await service.running["press-1"].close()
     told = re.fullmatch(
         rf"{re.escape(str(path))}:(\d+):\d+: .*; choose another (.*), or end what uses it", str(caught.value)
     )

@@ -203,11 +203,13 @@ def _with_ties_of_now(
     told = []
     for step in steps:
         best, tied = step.accepted, step.tied_with
+        needed: tuple[str, ...] = ()
         if best is not None:
             numbers = [name for name in tied if name not in search.shapes]
             tied = still_tied(search, columns, best, tied) if tied else ()
-            tied = (*dict.fromkeys((*tied, *needed_as_much(search, columns, best))), *numbers)
-        told.append(replace(step, tied_with=tied))
+            needed = tuple(name for name in needed_as_much(search, columns, best) if name not in tied)
+            tied = (*tied, *needed, *numbers)
+        told.append(replace(step, tied_with=tied, needed_as_much=needed))
         columns = [*columns, *(best.term.columns if best is not None else ())]
     return told
 

@@ -74,6 +74,8 @@ class SelectionStep:
     needs : mapping
         By term and by free form, how much likelier records are with it than with a smooth force alone
         (logarithm).
+    needed_as_much : tuple of str
+        Those that are tied by what records need alone: blocks tell them from the accepted one.
     """
 
     trials: tuple[Trial, ...]
@@ -85,6 +87,7 @@ class SelectionStep:
     reason: str
     beside: str = ""
     needs: Mapping[str, float] = field(default_factory=dict)
+    needed_as_much: tuple[str, ...] = ()
 
     @property
     def note(self) -> str:

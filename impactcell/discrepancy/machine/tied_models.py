@@ -16,11 +16,13 @@ were true beside a model error it erred 0.85 to 1.18 times as much [1]."""
 def with_tied_models(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
     """Fit each tied term where the named one stands, at the shape that its search gave it.
 
-    Those are tied no more with which held-out records are simulated clearly worse.
+    A term that is tied by what records need alone, while blocks tell it from the named one, is tied no more
+    if held-out records are simulated clearly worse with it, too.
     """
     models = dict(_tied_models(fits, finding))
     largest = MAX_TIED_ERROR * finding.simulated[1].rmse
-    apart = {name for name, model in models.items() if simulate_held_out(finding, model).rmse > largest}
+    needed = {name for step in finding.steps for name in step.needed_as_much} & models.keys()
+    apart = {name for name in needed if simulate_held_out(finding, models[name]).rmse > largest}
     steps = [
         replace(step, tied_with=tuple(name for name in step.tied_with if name not in apart))
         for step in finding.steps

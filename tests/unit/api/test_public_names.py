@@ -46,7 +46,7 @@ def test_each_is_documented_and_typed(name: str) -> None:
     [
         ("simulate_tap", ["velocity_m_s", "mass_kg", "stroke_m", "plant", "time_s"]),
         ("estimate", ["time_s", "force_n", "position_m", "velocity_m_s", "mass_kg", "stroke_m", "model"]),
-        ("track", ["cycle", "mu_s", "mu_s_std", "batch", "limit"]),
+        ("track", ["cycle", "mu_s", "mu_s_std", "batch", "limit", "mu_s_common_std"]),
         ("discrepancy", ["campaign", "model", "seed", "base", "train", "test"]),
     ],
 )
