@@ -59,11 +59,13 @@ def soon_taps(
     found, leads, doubted = [onsets[0]], {}, None
     for onset in contacts.contact_onsets(time, force, baseline, STILL_S):
         since = float(time[onset] - time[found[-1]])
+        if onset <= onsets[0]:
+            continue
         if onset in onsets:
-            found.append(onset) if onset > onsets[0] else None
+            found.append(onset)
             continue
         still = still_s(record, float(time[onset]))
-        if onset < onsets[0] or still < STILL_S or (is_told and since <= takes_s):
+        if still < STILL_S or (is_told and since <= takes_s):
             continue
         if is_told and since > SURELY_HALTED * takes_s:
             found.append(onset)
