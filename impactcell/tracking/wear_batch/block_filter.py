@@ -63,7 +63,9 @@ WIDTH = SEGMENT.itemsize // 8
 """Numbers of one segment."""
 Segments = NDArray[np.void]
 """Array of `SEGMENT`, shape (k,)."""
-ROOM = SEGMENTS + len(STEP_SCALES)
+PARTS = np.array([1.0, 5.0 / 6.0, 0.5, 1.0 / 6.0])
+"""Parts of a step that the block has in which it comes: all of it, and thirds of the block's cycles."""
+ROOM = SEGMENTS + len(STEP_SCALES) * len(PARTS)
 """Segments that there can be before they are merged."""
 
 
@@ -145,10 +147,13 @@ def filter_blocks(
         hazard = min(HAZARD * (cycle - before), MOST_PROBABLE) if block[CHANGE] == 0.0 else 0.0
         if block[CHANGE] > 0.0:
             hazard = 1.0
+        begun = 1.0 if block[CHANGE] > 0.0 else 1.0 / max(cycle - before, 1.0)
+        old = count
         if hazard > 0.0:
-            count = spawn(segments, count, cycle, hazard, model.step_variance)
+            count, old = spawn(segments, count, cycle, hazard, begun)
         value = block[VALUE] - slope * (cycle - origin)
-        log_density, count = take(segments, count, value, model.variance / block[WEIGHT], cycle - origin)
+        observed = value, model.variance / block[WEIGHT], cycle - origin
+        log_density, count = take(segments, count, observed, old, model.step_variance)
         evidence += log_density
         while count > SEGMENTS:
             closest, least = 0, np.inf
@@ -177,8 +182,12 @@ def walk(segments: Segments, count: int, variance: float) -> None:
 
 
 @compiled
-def spawn(segments: Segments, count: int, cycle: float, hazard: float, step_variance: float) -> int:
-    """Add what follows if a change came just before `cycle`, one for each size of step."""
+def spawn(segments: Segments, count: int, cycle: float, hazard: float, begun: float) -> tuple[int, int]:
+    """Add what follows if a change came with the block at `cycle`: each size of step, and part of it.
+
+    `begun` is the share of those that came just before the block. Gives how many segments there are, and
+    where the new ones begin, which `take` gives their step.
+    """
     changed = np.empty(count, segments.dtype)
     for i in range(count):
         changed[i] = segments[i]
@@ -186,32 +195,43 @@ def spawn(segments: Segments, count: int, cycle: float, hazard: float, step_vari
     merge(changed, 0, count)
     if hazard >= 1.0:
         count = 0
+    old = count
     for k in range(len(STEP_SCALES)):
-        segments[count] = changed[0]
-        segments[count].probability = hazard * STEP_SHARES[k]
-        segments[count].change = cycle
-        segments[count].total_variance += STEP_SCALES[k] ** 2 * step_variance
-        count += 1
-    return count
+        for part in range(len(PARTS)):
+            share = begun if part == 0 else (1.0 - begun) / (len(PARTS) - 1)
+            segments[count] = changed[0]
+            segments[count].probability = hazard * STEP_SHARES[k] * share
+            segments[count].change = cycle
+            count += 1
+    return count, old
 
 
 @compiled
-def take(segments: Segments, count: int, value: float, variance: float, passed: float) -> tuple[float, int]:
+def take(
+    segments: Segments, count: int, observed: tuple[float, float, float], old: int, step_variance: float
+) -> tuple[float, int]:
     """Update every segment with one value; log density of the value, and how many segments are left.
 
-    `passed` cycles since the origin: the value falls by as much as the slope grows.
+    Of what was `observed`, value, variance and cycles since the origin, the value falls by as much as the
+    slope grows. From `old` on there is a step s, of which the value has a part f: total + f s + e, and the
+    total becomes total + s. Those of one size are one afterwards, whatever the part was.
     """
+    value, variance, passed = observed
     top = -np.inf
     exponents = np.empty(count)
     for i in range(count):
         segment = segments[i]
-        spread = segment.total_variance + variance
+        step, part = 0.0, 0.0
+        if i >= old:
+            step = STEP_SCALES[(i - old) // len(PARTS)] ** 2 * step_variance
+            part = PARTS[(i - old) % len(PARTS)]
+        spread = segment.total_variance + part**2 * step + variance
         innovation = value - segment.total
         by_slope = -passed - segment.total_by_slope
         exponents[i] = -0.5 * innovation**2 / spread
         top = max(top, exponents[i])
         segment.probability /= math.sqrt(2.0 * math.pi * spread)
-        gain = segment.total_variance / spread
+        gain = (segment.total_variance + part * step) / spread
         crossed = segment.covariance
         segment.log_by_slope -= by_slope * innovation / spread
         segment.log_curvature -= by_slope**2 / spread
@@ -221,11 +241,20 @@ def take(segments: Segments, count: int, value: float, variance: float, passed: 
         segment.total += gain * innovation
         segment.level_variance -= crossed**2 / spread
         segment.covariance -= gain * crossed
-        segment.total_variance -= gain * segment.total_variance
+        segment.total_variance += step - gain**2 * spread
     total = 0.0
     for i in range(count):
         segments[i].probability *= math.exp(exponents[i] - top)
         total += segments[i].probability
+    for k in range((count - old) // len(PARTS)):
+        first = old + k * len(PARTS)
+        share = 0.0
+        for i in range(first, first + len(PARTS)):
+            share += segments[i].probability
+        if share > 0.0:
+            merge(segments, first, first + len(PARTS))
+        segments[old + k] = segments[first]
+    count = old + (count - old) // len(PARTS)
     kept = 0
     for i in range(count):
         segments[i].probability /= total

@@ -81,6 +81,51 @@ def test_evidence_level_and_variance_of_each_slope_are_those_of_the_model_in_one
         assert row[1] == pytest.approx(share @ squares - (share @ levels) ** 2, rel=1e-6)
 
 
+def test_a_step_within_a_block_is_weighed_by_the_part_of_it_that_the_block_has():
+    """Two blocks, a change with the second: normal distributions of both, one for each size and each part."""
+    hazard, values, weight = 8.0 * block_filter.HAZARD, np.array([0.2, 0.2 + 3.0 * STD]), 8.0
+    before = 4.0 * STD**2
+    covariance = np.full((3, 3), before)
+    covariance[0] = covariance[:, 0] = 0.0
+    covariance[0, 0] = 1e-10
+    wear = wear_blocks.WearBlocks(0.0, np.array([0.0, 0.2, 0.2]), covariance / STD**2)
+    blocks = np.array([[weight, 0.0, values[0], SURELY_NONE], [weight, 8.0, values[1], 0.0]])
+    _, segments = wear_blocks.before_blocks(wear, np.array([0.0]), STD**2)
+    evidence = block_filter.filter_slopes(np.array([0.0]), segments, blocks, 0.0, 0.0, MODEL)
+    share, parts, steps = [1.0 - hazard], [0.0], [0.0]
+    for part in block_filter.PARTS:
+        for size, scale in zip(STEP_SHARES, STEP_SCALES, strict=True):
+            share.append(hazard * size * (1.0 / 8.0 if part == 1.0 else 7.0 / 24.0))
+            parts.append(part)
+            steps.append(scale**2 * MODEL.step_variance)
+    z, densities, totals = values - 0.2, [], []
+    for part, step in zip(parts, steps, strict=True):
+        spread = before + np.diag(np.full(2, STD**2 / weight)) + step * np.diag([0.0, part**2])
+        densities.append(multivariate_normal.pdf(z, np.zeros(2), spread))
+        totals.append(0.2 + (before + step * np.array([0.0, part])) @ np.linalg.solve(spread, z))
+    joint = np.array(share) * densities
+    assert evidence[0] == pytest.approx(math.log(joint.sum()), abs=1e-9)
+    found = segments[0][segments[0]["probability"] > 0.0]
+    assert found["probability"] @ found["total"] == pytest.approx(joint @ totals / joint.sum(), abs=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", [65, 67, 70])
+def test_a_batch_that_changes_within_a_block_does_not_pass_for_wear(change):
+    """By least squares with the change told there is no wear: a block half way up was the begin of some."""
+    pulls = []
+    for seed in range(40):
+        values = 0.2 + STD * np.random.default_rng([23, seed]).normal(size=120)
+        values[change:] += 6.0 * STD
+        wear = wear_blocks.begin(0, values[0], 0.3)
+        for cycle, value in enumerate(values.tolist()):
+            wear = wear_blocks.update(wear_blocks.append(wear, cycle, value, 1.0, 0.0), MODEL)
+        found = wear_blocks.moments(wear, 119)
+        pulls.append((found.level - 0.2) / math.sqrt(found.level_variance))
+    assert np.mean(pulls) < 0.75
+    assert sum(abs(pull) < 1.96 for pull in pulls) >= 34
+
+
 def test_what_is_known_at_some_slopes_is_known_at_others_without_the_blocks():
     """Of one history of changes exactly: the blocks taken in at those slopes say the same."""
     rng = np.random.default_rng(7)
@@ -223,13 +268,15 @@ def test_blocks_are_kept_only_where_nobody_says_of_which_batch_a_cycle_is():
 
 
 @pytest.mark.parametrize("hazard", [1e-3, 0.4, 1.0])
-def test_a_change_that_may_have_been_takes_its_probability_from_that_of_none(hazard):
+@pytest.mark.parametrize("begun", [0.125, 1.0])
+def test_a_change_that_may_have_been_takes_its_probability_from_that_of_none(hazard, begun):
     grid = np.array([0.0])
     wear = wear_blocks.WearBlocks(0.0, np.array([0.0, 0.2, 0.2]), np.diag([1e-10, 4.0, 4.0]))
     _, segments = wear_blocks.before_blocks(wear, grid, STD**2)
     present = np.empty(block_filter.ROOM, block_filter.SEGMENT)
     count = block_filter.copy_present(segments[0], present)
-    count = block_filter.spawn(present, count, 8.0, hazard, 16.0 * STD**2)
+    count, old = block_filter.spawn(present, count, 8.0, hazard, begun)
+    assert old == (0 if hazard == 1.0 else 1)
     changed = present[:count]["change"] == 8.0
     probability = present[:count]["probability"]
     assert probability.sum() == pytest.approx(1.0)
