@@ -105,7 +105,7 @@ async def cycles(file: Path, number: int) -> list[dict[str, float]]:
             )
             spent: dict[str, float] = defaultdict(float)
             with timed(spent):
-                step_result = running.worker._process(capture, PositioningState(), None, ())
+                step_result = await running.worker.process(capture, PositioningState(), None)
                 server.publish(cell.name, step_result.snapshot)
                 for alarm in running.worker.alarms:
                     server.alarm(cell.name, alarm)

@@ -27,6 +27,7 @@ from impactcell.errors import DiscrepancyError
 from impactcell.physics.effects import LIBRARY
 from tests.benchmarks import _discrepancy_judge as judge
 from tests.benchmarks._discrepancy_lisdd import lisdd
+from tests.benchmarks._discrepancy_plan import CONFOUNDED
 from tests.benchmarks._discrepancy_sindy import sindy
 from tests.benchmarks.table import Table
 from tests.discrepancy.study import Job, campaign
@@ -200,9 +201,7 @@ def generous(row: Row) -> Row:
     """Same row with exact confounds tied: no method can tell them, and these know of no ties."""
     named = list(row["named"])
     tied = {
-        one: sorted(
-            {*row["tied"].get(one, []), *(judge.CONFOUNDED - {one} if one in judge.CONFOUNDED else ())}
-        )
+        one: sorted({*row["tied"].get(one, []), *(CONFOUNDED - {one} if one in CONFOUNDED else ())})
         for one in named
     }
     return row | {"tied": tied}

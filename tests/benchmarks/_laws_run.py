@@ -12,7 +12,6 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -168,8 +167,7 @@ def run(item: Hidden, job: Job, *, beside_rivals: bool = True) -> dict[str, Any]
         "law": None,
     }
     if beside_rivals and item.place in COMPARED:
-        truth = None if item.truth is None else partial(item.truth, p=hidden(job)[item.effect])
-        row["rivals"] = compare(item.place, truth, found)
+        row["rivals"] = compare(item.place, _truth(item, job), found)
     finding = found.law
     if finding is None:
         return row
@@ -223,16 +221,22 @@ def _faster(job: Job, found: DiscrepancyResult, finding: LawFinding) -> dict[str
     }
 
 
+def _truth(item: Hidden, job: Job) -> Callable[[Samples], Samples] | None:
+    """Give the function that is hidden in a campaign."""
+    truth, values = item.truth, hidden(job)
+    return None if truth is None else lambda u: truth(u, values[item.effect])
+
+
 def _error(item: Hidden, job: Job, finding: LawFinding) -> float | None:
     """RMS error of the force, or factor, over the states that were visited, over its RMS.
 
     None without a truth.
     A constant that the plant has taken up is no error.
     """
-    form, seen = finding.term.form, finding.term.visited
-    if item.truth is None or finding.refused or form.place != item.place:
+    form, seen, function_of = finding.term.form, finding.term.visited, _truth(item, job)
+    if function_of is None or finding.refused or form.place != item.place:
         return None
-    truth = item.truth(seen.values, hidden(job)[item.effect])
+    truth = function_of(seen.values)
     if finding.proposed is not None:
         function = finding.proposed.values(seen.values)
     else:

@@ -66,6 +66,7 @@ async def serve(kind: str) -> None:
         data = [SimData(0, values=list(range(65_000)), datatype=DataType.REGISTERS)]
         theirs = ModbusTcpServer(SimDevice(1, simdata=data), address=("127.0.0.1", 0))
         await theirs.serve_forever(background=True)
+        assert isinstance(theirs.transport, asyncio.Server)
         port = theirs.transport.sockets[0].getsockname()[1]
     print(port, flush=True)
     await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)

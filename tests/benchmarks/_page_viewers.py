@@ -15,7 +15,7 @@ STANDS_BACK = 10
 """Niceness: a tenth of the core where the others want all of it."""
 
 
-async def main(endpoint: str, user: str, password: str, cells: list[str]) -> None:
+async def main(endpoint: str, user: str, password: str, *cells: str) -> None:
     """Read all streams until one ends, which is a failure."""
     os.nice(STANDS_BACK)
     viewers = [Viewer(user, password) for _ in range(VIEWERS)]
@@ -29,4 +29,4 @@ async def main(endpoint: str, user: str, password: str, cells: list[str]) -> Non
 
 
 if __name__ == "__main__":
-    asyncio.run(main(*sys.argv[1:4], sys.argv[4:]))
+    asyncio.run(main(*sys.argv[1:]))

@@ -1,6 +1,7 @@
 """Size of a deviation beside the true one: how far off it is, in its own standard deviations."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -54,7 +55,7 @@ def table(*, quick: bool) -> Table:
     truth, alpha = Normality(settings), 1.0 / settings.false_alarm_cycles
     state = tracker.initial_state(settings)
     for vector in truth.vectors(np.random.default_rng(13), LEARNED) + truth.G @ truth.mean:
-        seen = friction_profile.SplineInformation(truth.G, vector, truth.seen.reached_m, truth.seen.seen)
+        seen = replace(truth.seen, vector=vector)
         state = tracker.update_reference(state, seen, settings, None)
     rows = []
     for number, (name, (family, make)) in enumerate(SHAPES.items()):

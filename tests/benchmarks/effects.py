@@ -8,7 +8,8 @@ from impactcell.physics import Plant, TapInput, simulate_tap
 from impactcell.physics.effects import LIBRARY
 from simulator import plant as simulated
 from simulator import plant_integrator
-from tests.benchmarks.physics import COLUMNS, B, K
+from tests.benchmarks._scipy_tap import B, K
+from tests.benchmarks.physics import COLUMNS
 from tests.benchmarks.table import Table
 
 TIGHT = {"RELATIVE_TOLERANCE": 1e-12, "LONGEST_CONTACT_STEP_S": 1e-4, "LONGEST_SLIDE_STEP_S": 1e-3}
