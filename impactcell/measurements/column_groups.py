@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,6 +55,14 @@ class ColumnGroup:
     notes: tuple[str, ...] = ()
 
 
+class GroupedText(NamedTuple):
+    """How such rows are written: what separates cells, decimal mark, words for lost values in lower case."""
+
+    delimiter: str
+    decimal: str
+    lost: frozenset[str] = frozenset()
+
+
 @dataclass(slots=True)
 class _Parts:
     """What has been read of a group."""
@@ -67,8 +76,7 @@ def tables_of_groups(
     source: str,
     lines: Sequence[str],
     groups: Sequence[ColumnGroup],
-    delimiter: str,
-    decimal: str,
+    text: GroupedText,
     begin: int = 1,
 ) -> list[Table]:
     """Read rows of text into a table for each group.
@@ -82,7 +90,7 @@ def tables_of_groups(
     lines : sequence of str
         Rows alone.
     groups : sequence of ColumnGroup
-    delimiter, decimal : str
+    text : GroupedText
     begin : int
         Number of the first of the lines.
 
@@ -94,9 +102,9 @@ def tables_of_groups(
     faults = LineFaults(source)
     parts = [_Parts([[] for _ in (TIME, *group.columns)], [], []) for group in groups]
     for first in range(0, len(lines), CHUNK_ROWS):
-        rows = [split_cells(line, delimiter) for line in lines[first : first + CHUNK_ROWS]]
+        rows = [split_cells(line, text.delimiter) for line in lines[first : first + CHUNK_ROWS]]
         for group, read in zip(groups, parts, strict=True):
-            _read(group, rows, begin + first, decimal, read, faults)
+            _read(group, rows, begin + first, text, read, faults)
     faults.raise_any()
     return [
         _table(source, group, read, several=len(groups) > 1)
@@ -109,7 +117,7 @@ def _read(
     group: ColumnGroup,
     rows: Sequence[Sequence[str]],
     begin: int,
-    decimal: str,
+    text: GroupedText,
     read: _Parts,
     faults: LineFaults,
 ) -> None:
@@ -127,7 +135,8 @@ def _read(
         cells = [rows[index][place] if place < len(rows[index]) else "" for index in present]
         if place == group.time and all(map(is_ticks, cells)):
             read.ticks.append(cells)
-        store.append(numbers_of(cells, [begin + index for index in present], name, decimal, faults))
+        numbered = [begin + index for index in present]
+        store.append(numbers_of(cells, numbered, name, text.decimal, faults, text.lost))
 
 
 def _table(source: str, group: ColumnGroup, read: _Parts, *, several: bool) -> Table:

@@ -12,7 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from impactcell.errors import MeasurementError
-from impactcell.measurements.column_groups import ColumnGroup, tables_of_groups
+from impactcell.measurements.column_groups import ColumnGroup, GroupedText, tables_of_groups
+from impactcell.measurements.dialect import Dialect
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.moments import read_moments
 from impactcell.measurements.numbers import parse_number
@@ -43,7 +44,7 @@ def is_labview(lines: Sequence[str]) -> bool:
     return lines[0].startswith(BEGINS)
 
 
-def read_labview(source: str, lines: Sequence[str], limits: Limits, decimal: str | None) -> tuple[Table, ...]:
+def read_labview(source: str, lines: Sequence[str], limits: Limits, given: Dialect) -> tuple[Table, ...]:
     """Read all segments; those that go on where the one before ended are one record.
 
     Parameters
@@ -51,8 +52,8 @@ def read_labview(source: str, lines: Sequence[str], limits: Limits, decimal: str
     source : str
     lines : sequence of str
     limits : Limits
-    decimal : str or None
-        What was given; None where the file says it.
+    given : Dialect
+        Its decimal mark, where the file is not to say it, and words for lost values.
 
     Raises
     ------
@@ -64,7 +65,7 @@ def read_labview(source: str, lines: Sequence[str], limits: Limits, decimal: str
         raise MeasurementError(f"{source}: is cut off in its header: {END_OF_HEADER} is missing")
     delimiter = next((found[1] for line in lines[:end] if (found := SEPARATOR.match(line))), "\t")
     of_file = _keys(lines[:end], delimiter)
-    mark = decimal or _first(of_file, "Decimal_Separator")
+    mark = given.decimal or _first(of_file, "Decimal_Separator")
     header: _Header | None = None
     tables: list[Table] = []
     segments, notes = 0, []
@@ -92,7 +93,8 @@ def read_labview(source: str, lines: Sequence[str], limits: Limits, decimal: str
                 f"{len(rows)} rows from line {first + 1} under a header of {counted:.0f} samples: taken to "
                 f"follow each other without a gap"
             )
-        read = tables_of_groups(source, rows, groups, delimiter, mark or _mark(rows, delimiter), first + 1)
+        text = GroupedText(delimiter, mark or _mark(rows, delimiter), given.lost)
+        read = tables_of_groups(source, rows, groups, text, first + 1)
         tables += (replace(table, name=f"segment {segments}") for table in read)
     if not tables:
         raise MeasurementError(f"{source}: holds no samples")

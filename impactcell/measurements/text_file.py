@@ -44,9 +44,9 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
     text, encoding = decode(path.read_bytes(), source, given.encoding)
     lines = _lines(text, source, limits)
     if is_labview(lines):
-        return read_labview(source, lines, limits, given.decimal)
+        return read_labview(source, lines, limits, given)
     if is_scope_export(lines):
-        return read_scope_export(source, lines, limits, given.decimal)
+        return read_scope_export(source, lines, limits, given)
     refuse_names_alone(lines, source)
     delimiter, decimal, how = detect([line for line in lines if not is_comment(line)], given)
     layout = find_layout(lines, source, delimiter, decimal, given.lost)

@@ -6,13 +6,20 @@ the export; its rows begin anew, with their own name, where a column of times st
 
 import re
 from collections.abc import Mapping, Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 
 import numpy as np
 
 from impactcell.errors import MeasurementError
-from impactcell.measurements.column_groups import ColumnGroup, is_ticks, moment_of_ticks, tables_of_groups
-from impactcell.measurements.dialect import split_cells
+from impactcell.measurements.column_groups import (
+    ColumnGroup,
+    GroupedText,
+    is_ticks,
+    moment_of_ticks,
+    tables_of_groups,
+)
+from impactcell.measurements.dialect import Dialect, split_cells
 from impactcell.measurements.limits import Limits
 from impactcell.measurements.numbers import is_missing, parse_number
 from impactcell.measurements.table import AGAIN, MeasuredColumn, Table
@@ -33,9 +40,7 @@ def is_scope_export(lines: Sequence[str]) -> bool:
     return BEGINS.match(lines[0]) is not None and any(map(STARTS.match, lines[1:HEAD_LINES]))
 
 
-def read_scope_export(
-    source: str, lines: Sequence[str], limits: Limits, decimal: str | None
-) -> tuple[Table, ...]:
+def read_scope_export(source: str, lines: Sequence[str], limits: Limits, given: Dialect) -> tuple[Table, ...]:
     """Read each group of channels into a table.
 
     Parameters
@@ -43,8 +48,8 @@ def read_scope_export(
     source : str
     lines : sequence of str
     limits : Limits
-    decimal : str or None
-        What was given; None where the file is to tell.
+    given : Dialect
+        Its decimal mark, where the file is not to tell, and words for lost values.
 
     Raises
     ------
@@ -63,7 +68,7 @@ def read_scope_export(
     )
     if top is None:
         raise MeasurementError(f"{source}: has no row of names below its begin; export it with its header")
-    first = next((row for row in range(top, len(lines)) if _is_row(lines[row], delimiter)), None)
+    first = next((row for row in range(top, len(lines)) if _is_row(lines[row], delimiter, given.lost)), None)
     if first is None:
         raise MeasurementError(f"{source}: holds no samples")
     last = len(lines) - (lines[-1].strip().strip('"') == END)
@@ -78,8 +83,8 @@ def read_scope_export(
             f"time for each sampling time (Timelines), and tabs between its cells"
         )
     limits.check_shape(source, len(rows), named)
-    mark = decimal or ("." if delimiter == "," or not _has_decimal_comma(rows) else ",")
-    tables = tables_of_groups(source, rows, groups, delimiter, mark, first + 1)
+    mark = given.decimal or ("." if delimiter == "," or not _has_decimal_comma(rows) else ",")
+    tables = tables_of_groups(source, rows, groups, GroupedText(delimiter, mark, given.lost), first + 1)
     tables, copies = _without_copies(tables)
     note = f"TwinCAT Scope, {len(groups)} {'time' if len(groups) == 1 else 'times'}, decimal " + (
         "comma" if mark == "," else "point"
@@ -116,9 +121,10 @@ def _cells(line: str, delimiter: str) -> list[str]:
     return [cell.strip().strip('"') for cell in split_cells(line, delimiter)]
 
 
-def _is_row(line: str, delimiter: str) -> bool:
-    """Whether a line holds numbers alone."""
-    filled = [cell for cell in split_cells(line, delimiter) if not is_missing(cell)]
+def _is_row(line: str, delimiter: str, lost: AbstractSet[str]) -> bool:
+    """Whether a line holds numbers alone, but for words that stand for values that were lost."""
+    cells = split_cells(line, delimiter)
+    filled = [cell for cell in cells if not is_missing(cell) and cell.strip().lower() not in lost]
     return bool(filled) and all(
         parse_number(cell) is not None or parse_number(cell, ",") is not None for cell in filled
     )

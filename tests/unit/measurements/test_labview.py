@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from impactcell.errors import MeasurementError
 from impactcell.measurements import guess, make_campaign, read_tables
+from impactcell.measurements.dialect import Dialect
 from impactcell.measurements.given import read_given
 
 STEP_S = 1e-3
@@ -230,3 +231,17 @@ def test_units_as_labview_writes_them_are_known(tmp_path: Path) -> None:
     segment = Segment({"Force": np.arange(9.0), "Current": np.arange(9.0)}, units=("Volts", "Amps"))
     (table,) = read_tables(write(tmp_path / "a.lvm", [segment]))
     assert [column.unit for column in table.columns] == ["s", "V", "A"]
+
+
+def test_words_for_lost_values_are_taken_as_they_were_said(tmp_path: Path) -> None:
+    values = np.arange(40.0)
+    path = write(tmp_path / "a.lvm", [Segment({"Force": values, "Position": values + 100.0})])
+    text = path.read_text()
+    path.write_text(text.replace("7.000000000E+00", "Over", 1).replace("1.090000000E+02", "OVER", 1))
+    with pytest.raises(MeasurementError, match=r"'Over' is not a number with decimal point.*`lost: "):
+        read_tables(path)
+    (table,) = read_tables(path, dialect=Dialect(lost=frozenset({"over"})))
+    force, position = (column.values for column in table.columns[1:])
+    assert np.flatnonzero(np.isnan(force)).tolist() == [7]
+    assert np.flatnonzero(np.isnan(position)).tolist() == [9]
+    assert np.array_equal(np.delete(force, 7), np.delete(values, 7))

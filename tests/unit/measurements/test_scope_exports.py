@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from impactcell.errors import MeasurementError
 from impactcell.measurements import guess, make_campaign, read_tables
+from impactcell.measurements.dialect import Dialect
 from impactcell.measurements.given import read_given
 from impactcell.measurements.table import Table
 
@@ -250,3 +251,16 @@ def test_pairs_of_moments_stand_to_each_other_as_they_say(tmp_path: Path, later_
     assert shot.force is not None
     assert shot.position is not None
     assert shot.position.time_s[0] - shot.force.time_s[0] == pytest.approx(later_s, abs=1e-9)
+
+
+def test_words_for_lost_values_are_taken_as_they_were_said(tmp_path: Path) -> None:
+    """In the first row, too, which has to be a row of numbers to be told from the header."""
+    values = np.vstack([np.arange(20.0) + 0.5, np.arange(20.0) + 100.5])
+    path = export(tmp_path / "a.csv", [Group(1.0, ["Force", "Position"], values)], decimal=".")
+    text = path.read_text()
+    path.write_text(text.replace("\t0.5", "\tOVER", 1).replace("\t108.5", "\tOver", 1))
+    (table,) = read_tables(path, dialect=Dialect(lost=frozenset({"over"})))
+    force, position = (column.values for column in table.columns[1:])
+    assert np.flatnonzero(np.isnan(force)).tolist() == [0]
+    assert np.flatnonzero(np.isnan(position)).tolist() == [8]
+    assert np.array_equal(force[1:], values[0, 1:])
