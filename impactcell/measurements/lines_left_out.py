@@ -1,9 +1,19 @@
 """Lines of a text file that are no rows of its table, in words."""
 
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from typing import Final
+
+from impactcell.measurements.dialect import Dialect, split_cells
+from impactcell.measurements.numbers import is_missing, parse_number
+from impactcell.measurements.text_layout import Layout, is_comment
 
 SHOWN: Final = 40
 """Signs of a line that are told."""
+LONGEST_FOOTER: Final = 30
+"""Lines below a table that are taken for a footer, at most: of more, something became of the first column."""
+LINES_SHOWN: Final = 3
+"""Lines of a footer that are told."""
 HEADER_AGAIN: Final = "the header again; delete the line"
 
 
@@ -13,8 +23,48 @@ def left_out(line: str, cells: int, width: int) -> str:
     >>> left_out("0.02,1", 2, 3), left_out("End of measurement", 1, 3)
     ("cut off after 2 of 3 cells: '0.02,1'", "the last line, and no row of the table: 'End of measurement'")
     """
-    text = line.strip()
-    shown = repr(text if len(text) <= SHOWN else f"{text[:SHOWN]}...")
-    if text.lstrip('+-.,"')[:1].isdigit():
+    shown, text = _shown(line), line.strip()
+    if _begins_as_number(text):
         return f"cut off after {cells} of {width} cells: {shown}"
     return f"the last line, and no row of the table: {shown}"
+
+
+def footer_begin(lines: Sequence[str], layout: Layout, dialect: Dialect) -> int:
+    """Index from which on lines are words below a table: none has a number in its first column.
+
+    A word that stands for a lost value is no such, nor is the header that comes again, nor what begins as a
+    number does. The number of lines where there is no footer.
+    """
+    lost: AbstractSet[str] = dialect.lost
+    header = None if layout.header_line is None else lines[layout.header_line - 1].strip()
+    begin, count = len(lines), 0
+    for index in range(len(lines) - 1 if 0 in layout.numeric else -1, layout.first_row, -1):
+        if is_comment(lines[index]):
+            continue
+        cell = split_cells(lines[index], dialect.delimiter or ",")[0].strip()
+        is_word = parse_number(cell, dialect.decimal or ".") is None and not _begins_as_number(cell)
+        if not is_word or is_missing(cell) or cell.lower() in lost:
+            break
+        begin, count = index, count + 1
+        if count > LONGEST_FOOTER or lines[index].strip() == header:
+            return len(lines)
+    return begin
+
+
+def footer_note(lines: Sequence[str], begin: int) -> str:
+    """Say which lines are a footer, and how they begin."""
+    places = [index for index in range(begin, len(lines)) if not is_comment(lines[index])]
+    told = ", ".join(_shown(lines[index]) for index in places[:LINES_SHOWN])
+    more = ", ..." if len(places) > LINES_SHOWN else ""
+    if len(places) == 1:
+        return f"line {begin + 1} left out, the last line, and no row of the table: {told}"
+    return f"lines {begin + 1} to {places[-1] + 1} left out, below the table and no rows of it: {told}{more}"
+
+
+def _shown(line: str) -> str:
+    text = line.strip()
+    return repr(text if len(text) <= SHOWN else f"{text[:SHOWN]}...")
+
+
+def _begins_as_number(text: str) -> bool:
+    return text.lstrip('+-.,"')[:1].isdigit()

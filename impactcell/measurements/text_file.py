@@ -22,7 +22,7 @@ from impactcell.measurements.dialect import (
 )
 from impactcell.measurements.labview import is_labview, read_labview
 from impactcell.measurements.limits import Limits
-from impactcell.measurements.lines_left_out import HEADER_AGAIN, left_out
+from impactcell.measurements.lines_left_out import HEADER_AGAIN, footer_begin, footer_note, left_out
 from impactcell.measurements.moments import read_moments
 from impactcell.measurements.names_alone import refuse_names_alone
 from impactcell.measurements.table import Lines, MeasuredColumn, Table, unique_names
@@ -51,8 +51,11 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
     delimiter, decimal, how = detect([line for line in lines if not is_comment(line)], given)
     layout = find_layout(lines, source, delimiter, decimal, given.lost)
     limits.check_shape(source, len(lines) - layout.first_row, len(layout.names))
-    watch = ThousandsWatch(decimal)
-    rows = _Rows(source, lines, layout, replace(given, delimiter=delimiter, decimal=decimal), watch)
+    watch, found = ThousandsWatch(decimal), replace(given, delimiter=delimiter, decimal=decimal)
+    end = footer_begin(lines, layout, found)
+    below = [footer_note(lines, end)] if end < len(lines) else []
+    lines = lines[:end]
+    rows = _Rows(source, lines, layout, found, watch)
     columns, numbers = rows.read()
     if given.decimal is None:
         watch.refuse(source, layout.names)
@@ -60,7 +63,7 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
     skipped = len(lines) - layout.first_row - len(numbers) - len(rows.left_out)
     if skipped:
         notes.append(f"{skipped} blank or comment lines left out")
-    notes += rows.left_out
+    notes += [*rows.left_out, *below]
     table = Table(
         source,
         _kept(layout, columns),

@@ -436,6 +436,44 @@ def test_a_last_line_that_is_left_out_is_named(tmp_path: Path, last: str, told: 
     assert not any("blank or comment" in note for note in table.notes)
 
 
+@pytest.mark.parametrize(
+    ("footer", "told"),
+    [
+        (
+            "\nStatistics\nMax;6\n# by hand\nMin;0\nOperator: M. Meier\n",
+            "lines 403 to 407 left out, below the table and no rows of it: 'Statistics', 'Max;6', 'Min;0', ...",
+        ),
+        ("Recorded;Meier\nDevice;7", "lines 402 to 403 left out, below the table and no rows of it: 'Rec"),
+    ],
+)
+def test_lines_of_words_below_the_table_are_left_out_and_named(
+    tmp_path: Path, footer: str, told: str
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t;F\n" + rows(400) + footer, encoding="utf-8")
+    table = one(path)
+    assert len(table) == 400
+    assert table.notes[-1].startswith(told)
+
+
+@pytest.mark.parametrize(
+    ("end", "fault"),
+    [
+        ("20;OVER\n21;OVER\n", "a.csv:4002: column 'F': 'OVER' is not a number"),
+        ("Max;6\n21;3\n", "a.csv:4002: column 't': 'Max' is not a number"),
+        ("Max;6\nt;F\n", "a.csv:4003: the header again; delete the line"),
+        ("Max;6\n" * 31, "a.csv:4002: column 't': 'Max' is not a number"),
+        ("1.5.2026;Meier\nDevice;7\n", "a.csv:4002: column 't': '1.5.2026' is not a number"),
+    ],
+)
+def test_no_row_is_taken_for_a_footer(tmp_path: Path, end: str, fault: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t;F\n" + rows(4000) + end, encoding="utf-8")
+    with pytest.raises(MeasurementError) as caught:
+        one(path)
+    assert fault in str(caught.value)
+
+
 def test_a_header_that_comes_again_is_one_fault(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("t;F\n" + rows(20) + "t;F\n" + rows(20), encoding="utf-8")
