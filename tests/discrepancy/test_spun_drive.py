@@ -26,6 +26,7 @@ from impactcell.discrepancy.machine.law_refusal import refusal_of
 from impactcell.discrepancy.machine.look_alikes import one_way_note
 from impactcell.discrepancy.report import german_sentences
 from impactcell.records import Capture, Channel, Samples
+from tests.discrepancy.machine_study import establish_in
 
 INERTIA, COULOMB, VISCOUS, ZERO = 1.2e-4, 0.012, 1.2e-4, -0.009
 """kg m², N m, N m s/rad, and the zero of the torque [N m]."""
@@ -34,42 +35,50 @@ TORQUES = ((0.05, 0.06), (0.05, 0.065), (0.052, 0.062), (-0.03, -0.04), (-0.03, 
 """Before and after 10 s, of one record each [N m]."""
 
 
-def record(torques: tuple[float, float], saturating: float, seed: int) -> tuple[Channel, Channel]:
-    """20 s of it; `saturating` is a friction that speed brings up to so many newton metres."""
+@lru_cache
+def campaign(saturating: float) -> Campaign:
+    """Twelve records of 20 s; `saturating` is a friction that speed brings up to so many newton metres."""
     time = np.arange(0.0, 20.0, STEP_S)
-    rng = np.random.default_rng(seed)
-    warm = 1.0 + 0.02 * rng.standard_normal()
+    levels = np.array(TORQUES * 2).T
+    numbers = range(1, levels.shape[1] + 1)
+    warm = np.array([1.0 + 0.02 * np.random.default_rng(number).standard_normal() for number in numbers])
 
-    def rates(seconds: float, state: np.ndarray) -> tuple[float, float]:
-        speed = state[1]
+    def rates(seconds: float, state: np.ndarray) -> np.ndarray:
+        _, speed = state.reshape(2, -1)
         friction = warm * (COULOMB * np.tanh(speed / 0.1) + VISCOUS * speed)
         friction += saturating * np.tanh(speed / 80.0)
-        return speed, (torques[int(seconds >= 10.0)] + ZERO - friction) / INERTIA
+        return np.concatenate([speed, (levels[int(seconds >= 10.0)] + ZERO - friction) / INERTIA])
 
-    path = solve_ivp(rates, (0.0, 20.0), (0.0, 0.0), t_eval=time, rtol=1e-8, atol=1e-8, max_step=0.05).y[0]
-    command = np.where(time < 10.0, *torques)
-    return Channel(time, command, None), Channel(time, LINE * np.round(path / LINE), None)
+    rest = np.zeros(2 * warm.size)
+    paths = solve_ivp(rates, (0.0, 20.0), rest, t_eval=time, rtol=1e-8, atol=1e-8, max_step=0.05).y
+    shots = []
+    for number, torques, path in zip(numbers, levels.T, paths[: warm.size], strict=True):
+        command, read = np.where(time < 10.0, *torques), LINE * np.round(path / LINE)
+        shots.append(
+            Capture(number, math.nan, math.nan, Channel(time, command, None), Channel(time, read, None))
+        )
+    return Campaign(Excitation.DRIVEN, tuple(shots), coordinate=Coordinate.ROTATION)
+
+
+BASE = BaseModel(
+    coordinate=Coordinate.ROTATION,
+    inertia=NumberPrior(INERTIA, math.inf),
+    terms=(TermChoice("coulomb_friction"), TermChoice("viscous_friction")),
+    force_offset=NumberPrior(0.0, math.inf),
+)
 
 
 @lru_cache
-def investigated(saturating: float, *, zero_is_free: bool = True) -> MachineFinding:
-    shots = [
-        Capture(number, math.nan, math.nan, *record(torques, saturating, number))
-        for number, torques in enumerate(TORQUES * 2, 1)
-    ]
-    base = BaseModel(
-        coordinate=Coordinate.ROTATION,
-        inertia=NumberPrior(INERTIA, math.inf),
-        terms=(TermChoice("coulomb_friction"), TermChoice("viscous_friction")),
-        force_offset=NumberPrior(0.0, math.inf if zero_is_free else 0.0),
-    )
-    campaign = Campaign(Excitation.DRIVEN, tuple(shots), coordinate=Coordinate.ROTATION)
-    return investigate_machine(campaign, base)
+def established() -> MachineFinding:
+    """What is established with one record of each drive, before a law is looked for."""
+    whole = campaign(0.0)
+    return establish_in(replace(whole, shots=whole.shots[: len(TORQUES)]), BASE)
 
 
 @pytest.mark.slow
-def test_what_never_comes_back_has_blocks_enough_and_shows_its_inertia() -> None:
-    finding = investigated(0.0)
+def test_what_never_comes_back_has_blocks_enough_and_shows_its_inertia_and_no_law() -> None:
+    finding = investigate_machine(campaign(0.0), BASE)
+    assert finding.law is None
     assert len(finding.training) > 5 * 8  # of eight records
     assert finding.final.nuisance("inertia") == pytest.approx(0.0, abs=0.1)
     assert finding.final.nuisance("force_offset") == pytest.approx(ZERO, rel=0.05)
@@ -77,8 +86,7 @@ def test_what_never_comes_back_has_blocks_enough_and_shows_its_inertia() -> None
 
 def test_a_law_that_cancels_the_drive_is_none() -> None:
     """The level of friction, another by 2 % in each record, is no function of the drive."""
-    finding = investigated(0.0)
-    assert finding.law is None
+    finding = established()
     final = finding.final
     place = final.fit.columns.index(("inertia", 0.0, 0))
 
@@ -108,7 +116,8 @@ def test_a_law_that_cancels_the_drive_is_none() -> None:
 @pytest.mark.parametrize("zero_is_free", [True, False])
 def test_friction_that_saturates_is_found_over_the_speed(zero_is_free: bool) -> None:
     """Also where the zero of the torque is held, which is 99 % of what remains then."""
-    finding = investigated(0.02, zero_is_free=zero_is_free)
+    zero = NumberPrior(0.0, math.inf if zero_is_free else 0.0)
+    finding = investigate_machine(campaign(0.02), replace(BASE, force_offset=zero))
     law = finding.law
     assert law is not None
     assert law.place == "law_of_friction_over_speed"
@@ -134,7 +143,7 @@ def test_friction_that_saturates_is_found_over_the_speed(zero_is_free: bool) -> 
 
 
 def test_a_function_of_position_may_be_one_of_time_where_every_record_goes_one_way() -> None:
-    records = investigated(0.0).records
+    records = established().records
     (note,) = one_way_note(records)
     assert german_sentences.note(note)[0] == "de"
     there = records[0]
