@@ -10,6 +10,8 @@ from impactcell.records import Capture, Channel
 from simulator import plant as simulated
 
 VISCOUS: dict[str, Any] = {"viscous_friction": {"viscous_coefficient_n_s_per_m": 85.0}}
+_motions: dict[str, simulated.Motion] = {}
+"""Of the taps that were asked for, by what tells them apart."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +34,13 @@ class Tap:
         return self.ratio * self.mu_s
 
     def motion(self) -> simulated.Motion:
+        """Integrate the tap, once in a process: many tests make the same ones."""
+        key = repr(self)
+        if key not in _motions:
+            _motions[key] = self._integrated()
+        return _motions[key]
+
+    def _integrated(self) -> simulated.Motion:
         plant = simulated.Plant(self.stiffness, self.damping, self.mu_s, self.mu_k, effects=self.effects)
         strike = simulated.TapInput(
             self.velocity_m_s,
