@@ -7,6 +7,8 @@ Exit codes: 0 done, 1 failed while working, 2 bad input, 3 ended with entries th
 import gc
 import logging
 import sys
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Annotated
 
@@ -288,4 +290,10 @@ def run_verb(arguments: list[str] | None = None) -> None:
     logging.basicConfig(level=logging.WARNING, format="%(levelname)s %(message)s", stream=sys.stderr)
     logging.getLogger("impactcell").setLevel(logging.INFO)
     on_compilation(say_compiling)
-    app(arguments)
+    _all_verbs()(arguments)
+
+
+@cache
+def _all_verbs() -> Callable[[list[str] | None], object]:
+    """Put the verbs together, once in a process."""
+    return typer.main.get_command(app)

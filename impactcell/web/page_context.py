@@ -5,6 +5,7 @@ import hashlib
 import time
 from collections.abc import Coroutine
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -42,7 +43,9 @@ YEAR_S: Final = 365 * 86_400
 """How long a browser remembers language and theme."""
 
 
+@cache
 def _environment() -> Environment:
+    """Give the templates, each compiled once in a process."""
     return Environment(
         loader=PackageLoader("impactcell.web"),
         autoescape=select_autoescape(default=True, default_for_string=True),
