@@ -2,15 +2,67 @@
 
 import re
 from collections.abc import Hashable
+from contextlib import suppress
 from typing import Any
 
 import yaml
+from yaml.composer import Composer
+from yaml.constructor import SafeConstructor
+from yaml.parser import Parser
+from yaml.reader import Reader
+from yaml.resolver import Resolver
+from yaml.scanner import Scanner
 
 
-class CoreLoader(yaml.SafeLoader):
-    """SafeLoader with the scalars of YAML 1.2's core schema; a repeated key is an error."""
+class _CoreResolver(Resolver):
+    """Says what a scalar is that has no tag, by YAML 1.2's core schema."""
 
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012
+
+
+class _TextComposer(Reader, Scanner, Parser, Composer, _CoreResolver):
+    """Finds the nodes of a text."""
+
+    def __init__(self, text: str) -> None:
+        Reader.__init__(self, text)
+        Scanner.__init__(self)
+        Parser.__init__(self)
+        Composer.__init__(self)
+        Resolver.__init__(self)
+
+
+if yaml.__with_libyaml__:
+    from yaml.cyaml import CParser  # type: ignore[attr-defined]  # not public in the stubs
+
+    class _QuickComposer(Composer, CParser, _CoreResolver):
+        """Finds them in a fraction of the time: libyaml reads, and nodes are put together as by the other."""
+
+        def __init__(self, text: str) -> None:
+            CParser.__init__(self, text)
+            Composer.__init__(self)
+            Resolver.__init__(self)
+
+
+def compose(text: str) -> yaml.Node | None:
+    """Give the node of a text's only document; None of a text without any.
+
+    What libyaml refuses is read once more without it: its words and places are others.
+
+    Raises
+    ------
+    yaml.YAMLError
+        The text is no YAML, or has several documents.
+    RecursionError
+        It is nested too deeply.
+    """
+    if yaml.__with_libyaml__:
+        with suppress(yaml.YAMLError):
+            return _QuickComposer(text).get_single_node()
+    return _TextComposer(text).get_single_node()
+
+
+class CoreConstructor(SafeConstructor):
+    """Builds values from nodes; a repeated key is an error."""
 
     def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:  # noqa: FBT001, FBT002
         """Build the value of a node; what cannot be what its tag or its digits say is told at its place."""
@@ -40,7 +92,7 @@ class CoreLoader(yaml.SafeLoader):
         return super().construct_mapping(node, deep=deep)  # type: ignore[arg-type] # which refuses other nodes
 
 
-def _decimal(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> int:
+def _decimal(loader: CoreConstructor, node: yaml.ScalarNode) -> int:
     return integer(str(loader.construct_scalar(node)))
 
 
@@ -60,7 +112,7 @@ for _tag, _pattern, _first in (
     ),
     ("merge", r"<<", "<"),
 ):
-    CoreLoader.add_implicit_resolver(
+    _CoreResolver.add_implicit_resolver(
         f"tag:yaml.org,2002:{_tag}", re.compile(f"^(?:{_pattern})$"), [*_first, *([""] * (_tag == "null"))]
     )
-CoreLoader.add_constructor("tag:yaml.org,2002:int", _decimal)
+CoreConstructor.add_constructor("tag:yaml.org,2002:int", _decimal)  # type: ignore[type-var]

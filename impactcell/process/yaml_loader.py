@@ -6,7 +6,7 @@ PyYAML alone follows 1.1, where each of these surprises.
 
 import difflib
 import itertools
-import unicodedata
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from typing import Final
 import yaml
 
 from impactcell.errors import SettingsError
-from impactcell.process.yaml_core_schema import CoreLoader, integer
+from impactcell.process.yaml_core_schema import CoreConstructor, compose, integer
 
 Location = tuple[str | int, ...]
 
@@ -37,8 +37,8 @@ _WAYS_OUT: Final = {
     ),
 }
 """What the parser finds, in words that name the way out."""
-_LAYOUT: Final = "\t\n\r\x85"
-"""Control characters that a text of several lines may have."""
+_OUT_OF_PLACE: Final = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\ud800-\udfff]")
+"""Control characters, but those that a text of several lines may have, and halves of characters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,15 +112,11 @@ def load(path: Path) -> tuple[object, Positions]:
         message = f"is not UTF-8 text (byte 0x{byte:02X} here); save it as UTF-8"
         raise SettingsError(format_error(path, place, message)) from fault
     try:
-        loader = CoreLoader(text)
-        try:
-            node = loader.get_single_node()
-            if node is None:
-                raise SettingsError(f"{path}:1:1: the file is empty")
-            positions = _positions(path, node)
-            return loader.construct_document(node), positions
-        finally:
-            loader.dispose()
+        node = compose(text)
+        if node is None:
+            raise SettingsError(f"{path}:1:1: the file is empty")
+        positions = _positions(path, node)
+        return CoreConstructor().construct_document(node), positions
     except yaml.MarkedYAMLError as fault:
         mark = fault.problem_mark or fault.context_mark
         place = FilePosition(mark.line + 1, mark.column + 1) if mark else FilePosition(1, 1)
@@ -153,7 +149,7 @@ def _positions(path: Path, root: yaml.Node) -> Positions:
             raise SettingsError(f"{path}:{place}: this part of the file contains itself")
         values[location] = place
         if isinstance(node, yaml.ScalarNode):
-            _check_characters(path, place, dotted(location), node.value)
+            _check_characters(path, place, location, node.value)
         if next(visits) > MOST_NODES:
             raise SettingsError(f"{path}:{place}: aliases describe more than {MOST_NODES} values")
         within = (*above, node)
@@ -174,22 +170,22 @@ def _positions(path: Path, root: yaml.Node) -> Positions:
                             key = integer(key_node.value)
                     here = (*location, key)
                     keys[here] = FilePosition(key_node.start_mark.line + 1, key_node.start_mark.column + 1)
-                    _check_characters(path, keys[here], dotted(location), key_node.value)
-                    is_empty[here] = value_node.tag == NULL and value_node.start_mark == value_node.end_mark
+                    _check_characters(path, keys[here], location, key_node.value)
+                    start, end = value_node.start_mark.index, value_node.end_mark.index
+                    is_empty[here] = value_node.tag == NULL and start == end
                     visit(value_node, here, within)
 
     visit(root, (), ())
     return Positions(keys, values, frozenset(here for here, empty in is_empty.items() if empty))
 
 
-def _check_characters(path: Path, place: FilePosition, name: str, text: str) -> None:
+def _check_characters(path: Path, place: FilePosition, location: Location, text: str) -> None:
     """Refuse what an escape can bring in, and no name, path or text has: it fails far from here."""
-    for character in text:
-        if unicodedata.category(character) in ("Cc", "Cs") and character not in _LAYOUT:
-            message = (
-                f"has the character U+{ord(character):04X}, which no name, path or text has; take it out"
-            )
-            raise SettingsError(format_error(path, place, f"{name}: {message}" if name else message))
+    found = _OUT_OF_PLACE.search(text)
+    if found:
+        message = f"has the character U+{ord(found[0]):04X}, which no name, path or text has; take it out"
+        name = dotted(location)
+        raise SettingsError(format_error(path, place, f"{name}: {message}" if name else message))
 
 
 def format_error(path: Path, place: FilePosition, message: str) -> str:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import BaseModel, ConfigDict, Field
@@ -216,3 +217,45 @@ def test_values_and_keys_with_any_tag_are_data_or_a_settings_error(
     path.write_text("".join(f"? {tag}{key}\n: {kind}{value}\n" for tag, key, kind, value in pairs))
     with contextlib.suppress(SettingsError):
         load(path)
+
+
+PIECES = [
+    "a: ",
+    "b",
+    "- ",
+    ", ",
+    ": ",
+    "&x ",
+    "*x",
+    "!!str ",
+    "|\n ",
+    ">-\n  ",
+    "# c",
+    "<<: ",
+    "1.5",
+    "~",
+    "é",
+    "\\",
+]
+MARKS = [*"{}[]'\"@%`=\t", "\n", "\n  ", "\r\n", "\x85", "\u2028", "---\n", "...\n", "%YAML 1.1\n"]
+
+
+def told(path: Path) -> object:
+    """What is read, or the fault."""
+    try:
+        return load(path)
+    except SettingsError as fault:
+        return str(fault)
+
+
+@given(st.lists(st.sampled_from(PIECES + MARKS), max_size=14).map("".join))
+def test_with_libyaml_and_without_a_text_is_the_same(
+    tmp_path_factory: pytest.TempPathFactory, text: str
+) -> None:
+    """But that it lets a tab stand behind a value, as YAML does and PyYAML alone does not."""
+    path = tmp_path_factory.mktemp("both") / "both.yaml"
+    path.write_text(text, encoding="utf-8", newline="")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(yaml, "__with_libyaml__", False)
+        without = told(path)
+    assert told(path) == without or (isinstance(without, str) and "\t" in text)
