@@ -58,9 +58,33 @@ class DoctestsOfTheProduct:
         return collectors
 
 
+class CollectionFromElsewhere:
+    """Has each worker begin to collect elsewhere: bytecode that one has written, the others read.
+
+    Of a fresh checkout each would compile all that it imports. The order of tests is settled afterwards.
+    """
+
+    def __init__(self, worker: int, workers: int) -> None:
+        self._share = worker / workers
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_make_collect_report(
+        self, collector: pytest.Collector
+    ) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
+        report = yield
+        if isinstance(collector, pytest.Directory) and report.passed:
+            first = int(self._share * len(report.result))
+            report.result = [*report.result[first:], *report.result[:first]]
+        return report
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Let the choice of doctests hold for the product too, which does not lie below this file."""
     config.pluginmanager.register(DoctestsOfTheProduct())
+    if hasattr(config, "workerinput"):
+        worker = int(config.workerinput["workerid"].removeprefix("gw"))
+        workers = int(config.workerinput["workercount"])
+        config.pluginmanager.register(CollectionFromElsewhere(worker, workers))
 
 
 def is_quick(config: pytest.Config) -> bool:
@@ -98,6 +122,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     All would wait for one that began last. Workers are given as many neighbouring tests each, and then take
     from each other; those of a file stay together, for they may have fixtures in common.
     """
+    items.sort(key=lambda item: str(item.path))
     if is_quick(config):
         leave_out_slow_tests(config, items)
     workers: int = getattr(config, "workerinput", {"workercount": 1})["workercount"]
