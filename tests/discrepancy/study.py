@@ -7,6 +7,7 @@ hidden are drawn from its seed; how strong it is, is given, or calibrated to a g
 import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -227,11 +228,15 @@ def _logged_shot(shot: Capture, phase: int, before: int, rng: np.random.Generato
     )
 
 
-def quick_campaign(job: Job, multiples: Sequence[float] = ()) -> Campaign:
-    """Make the campaign of a job with samples at 2 kHz, which is enough to tell effects apart."""
+@lru_cache(maxsize=64)
+def quick_campaign(job: Job) -> Campaign:
+    """Make the campaign of a job with samples at 2 kHz, which is enough to tell effects apart.
+
+    Once in a process: tests put channels in place of others and write into none.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tests.discrepancy.study.RATE_HZ", 2000.0)
-        return campaign(job, multiples)
+        return campaign(job)
 
 
 def name_effects(campaign: Campaign, **options: Any) -> DiscrepancyResult:
