@@ -2,6 +2,7 @@
 
 import datetime as dt
 import ipaddress
+from functools import cache
 from pathlib import Path
 
 from cryptography import x509
@@ -65,11 +66,20 @@ class Authority:
         return certificate, private
 
 
+@cache
+def _key_of(owner: str) -> rsa.RSAPrivateKey:
+    """Make the key of an owner, once in a process: it takes a tenth of a second."""
+    return rsa.generate_private_key(public_exponent=65537, key_size=2048)
+
+
 def self_signed(
     directory: Path, uri: str, begin: dt.datetime, end: dt.datetime, form: serialization.Encoding
 ) -> tuple[Path, Path]:
-    """Write `cert.der` or `cert.pem`, valid between two times, and `key.pem` of an application."""
-    key = rsa.generate_private_key(public_exponent=65537, key_size=2048)
+    """Write `cert.der` or `cert.pem`, valid between two times, and `key.pem` of an application.
+
+    Directories of the same name have the same key.
+    """
+    key = _key_of(directory.name)
     name = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "own")])
     certificate = (
         x509.CertificateBuilder()

@@ -3,7 +3,9 @@
 import asyncio
 import itertools
 import math
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +25,15 @@ from tests.unit.fieldbus.conftest import MAP
 from tests.unit.fieldbus.test_acquisition import running, take
 
 
-def declared(name: str) -> dict[str, Any]:
+@cache
+def shipped(name: str) -> dict[str, Any]:
     content: dict[str, Any] = yaml.safe_load((MAP.parent / f"{name}.yaml").read_text(encoding="utf-8"))
     return content
+
+
+def declared(name: str) -> dict[str, Any]:
+    """Give a map that may be changed."""
+    return deepcopy(shipped(name))
 
 
 ONE_BUFFER = RegisterMap.from_mapping(declared("one-buffer"))
