@@ -71,6 +71,8 @@ def noise_at_rest(recorded: Campaign, counted: Campaign) -> Mapping[str, NoiseAt
             where, resting = "after the tap", list(_after_the_tap(counted, channel))
         if len(resting) < MIN_SHARE * len(counted.shots):
             continue
+        if not np.median([np.ptp(values) for values in resting]) > 0.0:
+            continue  # an encoder that stands still shows no noise
         std = std_of_pieces(resting)
         white = float(np.median([white_noise_std(values) for values in resting]))
         excess = max(CERTAIN_EXCESS / math.sqrt(sum(map(len, resting))), MIN_EXCESS)

@@ -29,6 +29,7 @@ from impactcell.discrepancy.data.prepared_shots import (
     ShotSet,
     concatenate_shots,
 )
+from impactcell.discrepancy.data.replicate_groups import replicate_groups, start_places
 from impactcell.discrepancy.data.shot_making import STRATEGIES, prepared_shot
 from impactcell.discrepancy.data.shots_unlike import notes_of_unlike
 from impactcell.errors import CampaignError
@@ -106,11 +107,10 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         )
         raise CampaignError(message)
     batches = tuple(dict.fromkeys(capture.batch_id or "" for capture, _ in captures))
-    groups: dict[tuple[float, ...], int] = {}
+    recorded = [capture for capture, _ in captures]
+    groups = replicate_groups(recorded) if strategy.has_replicates else [*range(len(recorded))]
     shots = []
-    for number, (capture, record) in enumerate(captures, 1):
-        key = _settings(capture) if strategy.has_replicates else (float(number),)
-        group = groups.setdefault(key, len(groups))
+    for (capture, record), group in zip(captures, groups, strict=True):
         batch = batches.index(capture.batch_id or "")
         shots.append(prepared_shot(strategy, capture, (record, len(campaign.shots)), batch, group))
     if any(capture.onset_std_s for capture, _ in captures):
@@ -121,13 +121,16 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
     if campaign.excitation is not Excitation.DRIVEN:
         shots = without_clipped_samples(shots, data_faults, notes)
     shots = strategy.with_unstated_masses(shots)
+    covariates = _varying_covariates(strategy, shots)
+    if strategy.has_replicates and not any(start_places(recorded)):
+        covariates = tuple(name for name in covariates if name != "start")  # it was measured, and is one
     return PreparedCampaign(
         strategy,
         campaign.gravity_m_s2,
         campaign.stroke_m,
         tuple(shots),
         batches,
-        _varying_covariates(strategy, shots),
+        covariates,
         (
             _stated_noise(campaign.shots, "force"),
             _stated_noise(campaign.shots, "position"),
@@ -183,16 +186,6 @@ def shot_set(
     items = tuple(prepared.shots[int(index)] for index in indices)
     items = prepared.excitation.reduce(items, prepared.shots, prepared.gravity_m_s2, noise_std[POSITION])
     return concatenate_shots(prepared.excitation, prepared.gravity_m_s2, prepared.stroke_m, items, noise_std)
-
-
-def _settings(capture: Capture) -> tuple[float, ...]:
-    """Return what replicates have in common."""
-    return (
-        round(capture.velocity_m_s, 9) if math.isfinite(capture.velocity_m_s) else -1.0,
-        round(capture.mass_kg, 9) if math.isfinite(capture.mass_kg) else -1.0,
-        float(capture.direction),
-        round(capture.start_m, 9),
-    )
 
 
 def with_open_onset(prepared: PreparedCampaign) -> PreparedCampaign:

@@ -441,7 +441,7 @@ def test_a_last_line_that_is_left_out_is_named(tmp_path: Path, last: str, told: 
     [
         (
             "\nStatistics\nMax;6\n# by hand\nMin;0\nOperator: M. Meier\n",
-            "lines 403 to 407 left out, below the table and no rows of it: 'Statistics', 'Max;6', 'Min;0', ...",
+            "lines 403 to 407 left out, below the table and no rows of it: 'Statistics', 'Max;6', 'Min;",
         ),
         ("Recorded;Meier\nDevice;7", "lines 402 to 403 left out, below the table and no rows of it: 'Rec"),
     ],
