@@ -12,6 +12,7 @@ from impactcell.campaign import contacts
 from impactcell.measurements.captures import channel_of, described, direction_of, shot_numbers
 from impactcell.measurements.compression import in_compression
 from impactcell.measurements.faults import raise_faults
+from impactcell.measurements.force_zero import force_at_rest, notes_of_zeros, span, taps_in_words
 from impactcell.measurements.given_values import Given
 from impactcell.measurements.measured_records import Record
 from impactcell.measurements.put_back import from_its_place
@@ -19,7 +20,7 @@ from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.record_parts import end_of_tap, part_of
 from impactcell.measurements.soon_taps import SoonTaps, doubts_of, soon_taps
 from impactcell.numerics.spikes import noise_of
-from impactcell.records import MM_PER_MIN, Capture, Channel, Samples
+from impactcell.records import MM_PER_MIN, Capture, Channel
 
 START_STD = 10.0
 """Place of a part, in standard deviations of a sample, from which on the positions count from the table's
@@ -87,6 +88,7 @@ def taps_of(records: Sequence[Record], given: Given) -> tuple[list[Capture], lis
             "no position was recorded: such taps tell mu_s by peak force and the model of a cell, and no "
             "model by themselves (--column position=NAME if there is one)"
         )
+    notes += notes_of_zeros([(tap.record.values[ColumnMeaning.FORCE], tap.onset) for tap in taps])
     numbers, starts = shot_numbers([tap.record for tap in taps]), _contact_times(taps, notes)
     return [_capture(*one, given) for one in zip(numbers, taps, starts, strict=True)], notes
 
@@ -187,11 +189,8 @@ def _of_actuator(taps: Sequence[_TapRecord]) -> list[str]:
     found = [tap.velocity_m_s / MM_PER_MIN for tap in taps if tap.of_actuator]
     if not found:
         return []
-    low, high = f"{min(found):.4g}", f"{max(found):.4g}"
-    velocity = low if low == high else f"{low} to {high}"
-    told = "1 tap" if len(found) == 1 else f"{len(found)} taps"
-    note = f"velocity {velocity} mm/min taken from the actuator channel about contact, in {told}"
-    return [f"{note} (--set velocity=... says otherwise)"]
+    of = f"velocity {span(found, '.4g')} mm/min taken from the actuator channel about contact"
+    return [f"{of}, in {taps_in_words(len(found))} (--set velocity=... says otherwise)"]
 
 
 def _slope(record: Record, onset: int | None) -> float:
@@ -208,7 +207,7 @@ def _from_their_places(taps: Sequence[_TapRecord], notes: list[str]) -> list[_Ta
     """Leave out positions of before a part was put to where it is struck, and tell of it."""
     kept = [replace(tap, record=from_its_place(tap.record, tap.onset)) for tap in taps]
     if changed := sum(before.record is not after.record for before, after in zip(taps, kept, strict=True)):
-        told = "1 tap" if changed == 1 else f"{changed} taps"
+        told = taps_in_words(changed)
         notes.append(f"positions left out of before the part was put to where it is struck, in {told}")
     return kept
 
@@ -221,20 +220,19 @@ def _contact_times(taps: Sequence[_TapRecord], notes: list[str]) -> list[float]:
         for tap in triggered:
             force = tap.record.values[ColumnMeaning.FORCE]
             times.append(tap.record.times[ColumnMeaning.FORCE])
-            forces.append(force - _rest_force(force, tap.onset))
+            forces.append(force - force_at_rest(force, tap.onset))
             onsets.append(tap.onset or 0)
             velocities.append(tap.velocity_m_s)
         refined = iter(contacts.onset_within_sample(times, forces, onsets, velocities))
         step = float(np.median([np.median(np.diff(time)) for time in times]))
-        told = "1 tap" if len(triggered) == 1 else f"{len(triggered)} taps"
         notes.append(
-            f"t = 0 put where the force begins, in {told}, good to a part of the sampling step of "
-            f"{1e3 * step:.3g} ms; what lies before is kept as pretrigger"
+            f"t = 0 put where the force begins, in {taps_in_words(len(triggered))}, good to a part of the "
+            f"sampling step of {1e3 * step:.3g} ms; what lies before is kept as pretrigger"
         )
     else:
         refined = iter(())
     if cut_off := sum(tap.onset == 0 for tap in taps):
-        told = "1 tap" if cut_off == 1 else f"{cut_off} taps"
+        told = taps_in_words(cut_off)
         notes.append(f"contact is there from the first sample on in {told}: that is taken for t = 0")
     if any(tap.onset is None for tap in taps):
         notes.append("no samples before contact: the records' own t = 0 is taken")
@@ -247,18 +245,12 @@ def _start_of(tap: _TapRecord, refined: Iterator[float]) -> float:
     return next(refined) if tap.onset else float(tap.record.times[ColumnMeaning.FORCE][0])
 
 
-def _rest_force(force: Samples, onset: int | None) -> float:
-    """Force without contact, from the samples before it [N]."""
-    before = force[: max((onset or 0) - 1, 0)]
-    return float(np.median(before)) if len(before) >= 3 else 0.0
-
-
 def _capture(number: int, tap: _TapRecord, t0: float, given: Given) -> Capture:
     record = tap.record
     channels: dict[str, Channel | None] = {str(q): channel_of(record, q, t0) for q in CHANNELS}
     force = channels["force"]
     if force is not None:
-        offset = _rest_force(force.values, tap.onset)
+        offset = force_at_rest(force.values, tap.onset)
         channels["force"] = Channel(force.time_s, force.values - offset)
     position = channels["position"]
     start = 0.0

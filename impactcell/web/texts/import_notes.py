@@ -26,6 +26,10 @@ GERMAN: Final = {
         r"Geschwindigkeit \1 mm/min, aus dem Weg des Aktors um den Kontakt (Stöße: \2)",
     r"velocity (\S+) to (\S+) mm/min taken from the actuator channel about contact, in (\d+) taps?":
         r"Geschwindigkeit \1 bis \2 mm/min, aus dem Weg des Aktors um den Kontakt (Stöße: \3)",
+    r"force of (\S+) N without contact taken off, in (\d+) taps?":
+        r"Kraft von \1 N ohne Berührung abgezogen (Stöße: \2)",
+    r"force of (\S+) to (\S+) N without contact taken off, in (\d+) taps?":
+        r"Kraft von \1 bis \2 N ohne Berührung abgezogen (Stöße: \3)",
     r"force turned: it was negative in compression": "Kraft umgekehrt: sie war bei Druck negativ",
     r"force turned in (\d+) of (\d+) contacts: its sign goes with the direction of motion":
         r"Kraft bei \1 von \2 Berührungen umgekehrt: ihr Vorzeichen geht mit der Bewegungsrichtung",

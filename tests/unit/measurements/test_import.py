@@ -644,3 +644,22 @@ def test_a_velocity_that_only_the_actuator_shows_is_told(tmp_path: Path, head: s
     )
     german = "Geschwindigkeit 2500 bis 4500 mm/min, aus dem Weg des Aktors um den Kontakt (Stöße: 2)"
     assert page_note(note, "de") == ("de", german)
+
+
+@pytest.mark.parametrize(("zero_n", "told"), [(2.0, "force of 1.9"), (-3.0, "force of -3.0"), (0.02, "")])
+def test_a_zero_of_the_force_is_taken_off_and_told(zero_n: float, told: str) -> None:
+    rng, tables = np.random.default_rng(7), []
+    for tap in taps((3000, 4000), (18.9,)):
+        time, force, position = sampled(tap, rng)
+        tables.append(table(Time=("s", time), Force=("N", force + zero_n), Position=("m", position)))
+    given = Given(constants={"mass": 18.9, "velocity": 0.05})
+    imported = make_campaign(tables, guess(tables, given))
+    notes = [note for note in imported.notes if "without contact" in note]
+    assert len(notes) == (1 if told else 0)
+    for note in notes:
+        assert note.startswith(told)
+        assert note.endswith("N without contact taken off, in 4 taps")
+        assert page_note(note, "de")[1].startswith("Kraft von ")
+    for shot in imported.campaign.shots:
+        assert shot.force is not None
+        assert abs(float(np.median(shot.force.values[shot.force.time_s < 0.0]))) < 0.1
