@@ -28,6 +28,7 @@ from impactcell.positioning.displacement_discrepancy import (
     swing_m,
 )
 from impactcell.positioning.model_hypotheses import swing_std
+from impactcell.positioning.parameter_directions import ACROSS, ACROSS_Z, directions_of
 from impactcell.positioning.planner_posterior import (
     DAMPING,
     FRICTION,
@@ -36,16 +37,10 @@ from impactcell.positioning.planner_posterior import (
     STIFFNESS,
     VISCOUS,
     PlannerPosterior,
-    cov_at,
-    mean_at,
 )
 from impactcell.positioning.scatter_hypotheses import quantile_scales
 from impactcell.records import Samples
 
-ACROSS = 4
-"""Directions across the line: parameters other than friction."""
-ACROSS_Z = 3.0
-"""Standard deviations at which these are taken: beyond lies 1 in 1000, which is what is promised."""
 WIDEST_CORRECTED = 0.1
 """Std of ln(mu_k) up to which its skewness is corrected for: what is wider is a sum of several."""
 FOLD_SHARE = 0.1
@@ -90,26 +85,14 @@ def parameter_scenarios(
 
     `swing` is `Scenarios.swing_std` where it is not the posterior's own.
     """
-    cov = cov_at(posterior, part, place)
-    scales = quantile_scales(posterior.mixed_scatter, z)
-    scatter = scales[:, 0]
-    known = cov[FRICTION, FRICTION]
-    sigma = np.sqrt(known + scatter**2)
+    known = directions_of(posterior, float(part[0]), float(place[0]))
+    cov, steps, weights_along = known.cov, known.steps, known.weights_along
+    scales = quantile_scales(posterior.scatter_scores, z)
+    sigma = np.sqrt(cov[FRICTION, FRICTION] + scales[:, 0] ** 2)
     along = cov[FRICTION] / sigma[:, None]
     along[:, FRICTION] = sigma
-    mean_line = cov[FRICTION] / math.sqrt(known + posterior.scatter**2)
-    across = cov[1:, 1:] - np.outer(mean_line[1:], mean_line[1:])
-    others = PARAMETERS - 1
-    values, vectors = np.linalg.eigh(across[:others, :others])
-    lengths = np.sqrt(np.maximum(values, 0.0))
-    steps = ACROSS_Z * (vectors * lengths).T
-    # weights of the discrepancy that go with each of these directions, and covariance that is left of theirs
-    weights_along = (across[others:, :others] @ vectors / np.maximum(lengths, 1e-12)).T
-    weights_left = across[others:, others:] - weights_along.T @ weights_along
-    weights_along *= ACROSS_Z
-    variances, axes = np.linalg.eigh(weights_left)
     theta = np.empty((z.size + 2 * ACROSS, PARAMETERS + FEATURES))
-    theta[:] = mean_at(posterior, part, place)
+    theta[:] = known.mean
     theta[: z.size] += z[:, None] * along
     # ln(1 + s z) to second order: a factor of friction is normal, not log-normal
     theta[: z.size, FRICTION] -= 0.5 * np.minimum(sigma, WIDEST_CORRECTED) ** 2 * z**2
@@ -117,12 +100,11 @@ def parameter_scenarios(
     theta[z.size + ACROSS :, 1:PARAMETERS] -= steps
     theta[z.size : z.size + ACROSS, PARAMETERS:] += weights_along
     theta[z.size + ACROSS :, PARAMETERS:] -= weights_along
-    root = axes * np.sqrt(np.maximum(variances, 0.0))
     weights = np.ascontiguousarray(theta[:, PARAMETERS:])
     return Scenarios(
         plant_parameters(theta),
         weights,
-        np.ascontiguousarray(root),
+        known.root,
         np.ascontiguousarray(scales[:, 1:]),
         part,
         place,

@@ -31,7 +31,7 @@ class Knowledge(NamedTuple):
 
 def knowledge_of(posterior: PlannerPosterior) -> Knowledge:
     """Return what a table made now would hang on."""
-    scatter = quantile_scales(posterior.mixed_scatter, SCATTER_Z)
+    scatter = quantile_scales(posterior.scatter_scores, SCATTER_Z)
     return Knowledge(posterior.mean, np.sqrt(np.diag(posterior.cov)), scatter, swing_std(posterior))
 
 

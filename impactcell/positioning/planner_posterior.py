@@ -13,13 +13,14 @@ happened (`impactcell.positioning.posterior_update`).
 
 import math
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from impactcell.positioning.displacement_discrepancy import FEATURES, friction_features
 from impactcell.positioning.displacement_discrepancy import LEARNED_STD as LEARNED_WEIGHTS_STD
 from impactcell.positioning.prediction_watch import PredictionWatch
-from impactcell.positioning.scatter_hypotheses import mean_variances, prior_weights
+from impactcell.positioning.scatter_hypotheses import TailScores, mean_variances, prior_weights, tail_scores
 from impactcell.records import Samples
 
 FRICTION, STIFFNESS, DAMPING, RATIO, VISCOUS = range(5)
@@ -34,11 +35,12 @@ BATCH_STD = 0.08  # of friction, after a batch step whose size the tracker has n
 LEVEL_STD = 0.007  # the tracker's level is believed no better than this: successive levels are correlated
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class PlannerPosterior:
     """Sums of Gaussians over the parameters and the discrepancy, and grids over the scatter.
 
-    Each of h hypotheses has its own; `impactcell.positioning.model_hypotheses` has what they are.
+    Each of h hypotheses has its own; `impactcell.positioning.model_hypotheses` has what they are. What a plan
+    asks for several times is worked out once.
 
     Attributes
     ----------
@@ -75,38 +77,51 @@ class PlannerPosterior:
     @property
     def probabilities(self) -> Samples:
         """Of the hypotheses, shape (h,)."""
-        numbers = np.arange(len(self.scatter_weights))[:, None]
-        probabilities: Samples = (self.hypotheses == numbers) @ self.weights
-        return probabilities
+        return self._probabilities.copy()
 
     @property
     def mixed_scatter(self) -> Samples:
         """Probability of each combination of scatter over all hypotheses, shape (g,)."""
-        mixed: Samples = self.probabilities @ self.scatter_weights
+        mixed: Samples = self._probabilities @ self.scatter_weights
         return mixed
 
-    @property
+    @cached_property
     def scatter(self) -> float:
         """Predictive standard deviation of a tap's friction factor."""
         return math.sqrt(float(mean_variances(self.mixed_scatter)[0]))
 
+    @cached_property
+    def scatter_scores(self) -> TailScores:
+        """How far each of the scatters reaches over all hypotheses."""
+        return tail_scores(self.mixed_scatter)
+
     @property
     def mean(self) -> Samples:
         """Mean of parameters and weights, shape (n,)."""
-        mean: Samples = self.weights @ self.means
-        return mean
+        return self._moments[0].copy()
 
     @property
     def cov(self) -> Samples:
         """Their covariance, shape (n, n)."""
-        apart = self.means - self.mean
-        cov: Samples = np.einsum("c,cij->ij", self.weights, self.covs) + (apart.T * self.weights) @ apart
-        return cov
+        return self._moments[1].copy()
 
     @property
     def mu_k(self) -> float:
         """Kinetic coefficient, median."""
         return math.exp(float(self.mean[FRICTION]))
+
+    @cached_property
+    def _probabilities(self) -> Samples:
+        numbers = np.arange(len(self.scatter_weights))[:, None]
+        probabilities: Samples = (self.hypotheses == numbers) @ self.weights
+        return probabilities
+
+    @cached_property
+    def _moments(self) -> tuple[Samples, Samples]:
+        mean: Samples = self.weights @ self.means
+        apart = self.means - mean
+        cov: Samples = np.einsum("c,cij->ij", self.weights, self.covs) + (apart.T * self.weights) @ apart
+        return mean, cov
 
 
 def with_single_gaussian(posterior: PlannerPosterior, mean: Samples, cov: Samples) -> PlannerPosterior:

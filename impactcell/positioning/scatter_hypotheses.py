@@ -46,6 +46,8 @@ GRID = np.stack(np.meshgrid(FRICTION_STD, DISPLACEMENT_STD, CONTACT_STD, indexin
 SHAPE = (FRICTION_STD.size, DISPLACEMENT_STD.size, CONTACT_STD.size)
 """Of the grid."""
 
+TailScores = tuple[Samples, Samples, Samples]
+"""Of friction, displacement and contact, each at the deviations `REACH`."""
 TAILS = tuple(ndtr(-REACH / std[:, None]) for std in (FRICTION_STD, DISPLACEMENT_STD, CONTACT_STD))
 """Of each standard deviation, the probability to reach further than each of these."""
 
@@ -101,7 +103,17 @@ def update_weights(
     return normalised, float(np.log(weights @ likelihood))
 
 
-def quantile_scales(weights: Samples, z: Samples) -> Samples:
+def tail_scores(weights: Samples) -> TailScores:
+    """Return how far each scatter reaches: the score z of the probability to reach beyond each `REACH`."""
+    cube, scores = weights.reshape(SHAPE), []
+    for n, tails in enumerate(TAILS):
+        share = cube.sum(axis=tuple(axis for axis in range(3) if axis != n))
+        scores.append(-ndtri(np.maximum(share @ tails, 1e-300)))
+    friction, displacement, contact = scores
+    return friction, displacement, contact
+
+
+def quantile_scales(scores: TailScores, z: Samples) -> Samples:
     """Return the standard deviation that each scatter has at the nodes z, shape (nodes, 3).
 
     A sum of normal distributions has heavier tails than one: at node z it reaches Q(z), and counts there as
@@ -109,10 +121,6 @@ def quantile_scales(weights: Samples, z: Samples) -> Samples:
     """
     nodes = np.maximum(np.abs(z), 0.05)
     scales = np.empty((z.size, 3))
-    cube = weights.reshape(SHAPE)
-    for n, tails in enumerate(TAILS):
-        share = cube.sum(axis=tuple(axis for axis in range(3) if axis != n))
-        tail = share @ tails
-        score = -ndtri(np.maximum(tail, 1e-300))
+    for n, score in enumerate(scores):
         scales[:, n] = np.interp(nodes, score, REACH) / nodes
     return scales

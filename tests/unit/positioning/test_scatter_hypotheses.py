@@ -10,6 +10,7 @@ from impactcell.positioning.scatter_hypotheses import (
     PRIOR_WEIGHTS,
     mean_variances,
     quantile_scales,
+    tail_scores,
     update_weights,
 )
 
@@ -52,7 +53,7 @@ def test_an_outlier_is_not_scatter() -> None:
 
 def test_tails_are_those_of_the_sum_of_normals() -> None:
     z = np.array([-3.3, -1.2, 1.2, 3.3])
-    scales = quantile_scales(PRIOR_WEIGHTS, z)
+    scales = quantile_scales(tail_scores(PRIOR_WEIGHTS), z)
     share = np.array([PRIOR_WEIGHTS[GRID[:, 0] == std].sum() for std in FRICTION_STD])
     reached = np.abs(z) * scales[:, 0]
     tail = (share[:, None] * norm.sf(reached / FRICTION_STD[:, None])).sum(axis=0)
