@@ -7,13 +7,17 @@ from pathlib import Path
 
 from impactcell.api.friction import calibrated
 from impactcell.campaign import Campaign, Excitation
+from impactcell.discrepancy.search import Remaining
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.errors import PhysicsError, PredictionError
 from impactcell.physics import Plant
-from impactcell.prediction import Model
+from impactcell.prediction import REMAINS, Model
 from impactcell.prediction.model import Prior
+from impactcell.prediction.told_parameters import parameter_words, untold
 from impactcell.settings.model_file import write_model, write_part_of_model
 
+LEAST_SHARE = 0.005
+"""Share of the held-out gap [1] below which a per cent is not told of what remains."""
 SMALLEST_SHARE = 1e-4
 """Smallest standard deviation of a prior, relative to its value: a prior of none would stop any fit."""
 
@@ -76,6 +80,10 @@ def _extended_model(result: DiscrepancyResult, data: Campaign, source: str, nomi
         intervals=_intervals(result),
         provenance=provenance,
     )
+    if names := untold(model, None if nominal is None else nominal.prior):
+        words = parameter_words(model)
+        told = f"{', '.join(words[name] for name in names)} (± is 95 %)"
+        model = replace(model, provenance={**provenance, "not told, so of no use in a cell": told})
     if data.excitation is not Excitation.TAP:
         return model
     fitted = {shot.number for shot in result.prepared.shots}
@@ -102,7 +110,17 @@ def _provenance(result: DiscrepancyResult, source: str) -> dict[str, str]:
         "verdict": result.verdict,
         "held-out gap before": f"{result.validation.gap_before:.4g}",
         "held-out gap after": f"{result.validation.gap_after:.4g}",
+        **({REMAINS: remains} if result.added and (remains := _remains(result.conclusion.remaining)) else {}),
     }
+
+
+def _remains(remaining: Remaining) -> str:
+    """Say what no established effect explains, and where; empty where that is nothing."""
+    if remaining.explained:
+        return ""
+    share = f"{remaining.share:.0%} of the held-out gap" if remaining.share >= LEAST_SHARE else "a pattern"
+    phases = dict.fromkeys(place.phase.replace("_", " ") for place in remaining.where)
+    return f"{share}{', in ' if phases else ''}{', '.join(phases)}"
 
 
 def _extended_plant(result: DiscrepancyResult, nominal: Plant | None) -> Plant:

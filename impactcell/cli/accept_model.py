@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from impactcell.cell import in_place_of
 from impactcell.cli.calibrate import calibrated_model
+from impactcell.cli.model_origin import origin_of, untold_sentence
 from impactcell.cli.own_taps import OwnTaps, compare_on_own_taps
 from impactcell.cli.paths import check_output
 from impactcell.cli.shared_model import cells_sharing, note_sharing
@@ -34,14 +35,17 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
 
     The model that it replaces is kept beside it as `<name>.previous.yaml`. A running service sees the new
     file within a second and goes on with it from the next cycle; tracker, alarms and journal stay. One with
-    which the cell's own last taps fit clearly worse is put into service only `anyway`.
+    which the cell's own last taps fit clearly worse, or whose contact nothing tells, is put into service only
+    `anyway`. What the investigation established that it comes from is said, with a caution where that is
+    nothing or something remains.
 
     Raises
     ------
     SettingsError
         A file cannot be read or written.
     PredictionError
-        The part would not slide free over the calibrated range, or the cell's own taps speak against it.
+        The part would not slide free over the calibrated range, the cell's own taps speak against it, or
+        nothing tells what its contact is like.
     JournalError
         The cell's journal cannot be read.
     """
@@ -53,6 +57,9 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
     for finding in judge_cell(read_cell(cell)):
         if finding.is_fault:
             print_note(str(finding))
+    origin = origin_of(model)
+    if origin is not None and origin.caution:
+        print_note(origin.caution)
     _tell(
         {
             "cell": cell_config.name,
@@ -60,10 +67,12 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
             "previous": str(previous),
             "shared_with": list(sharing),
             "own_taps": None if own_taps is None else own_taps.content,
+            "verdict": None if origin is None else origin.verdict,
+            "caution": None if origin is None else origin.caution,
         },
         f"{cell_config.name} runs with model {model.name} "
         + (f"from the next cycle on; before: {previous}" if is_new else "already; nothing was changed")
-        + ("" if own_taps is None else f"\n{own_taps.sentence}"),
+        + "".join(f"\n{one.sentence}" for one in (own_taps, origin) if one is not None),
         as_json=as_json,
     )
 
@@ -77,14 +86,22 @@ def _judged(config: CellConfig, extended: Path, *, anyway: bool) -> tuple[Model,
         Why it cannot be put into service.
     """
     check_output(previous_model(config.settings.model), SettingsError)
-    model = calibrated_model(replace(config, model=read_model(extended)))
+    found = read_model(extended)
+    if (nothing_tells := untold_sentence(found, config.model.prior)) and not anyway:
+        raise _refusal(config, found, extended, nothing_tells)
+    model = calibrated_model(replace(config, model=found))
     own_taps = compare_on_own_taps(config, model)
     if own_taps is not None and own_taps.speaks_against and not anyway:
-        files = [str(file.absolute()) for file in (config.path, extended)]
-        command = shlex.join(["impactcell", "model", "accept", *files, "--anyway"])
-        told = f"model {model.name} is not put into service (`{command}` would)"
-        raise PredictionError(f"{config.name}: {told}: {own_taps.sentence}")
+        raise _refusal(config, model, extended, own_taps.sentence)
     return model, own_taps
+
+
+def _refusal(config: CellConfig, model: Model, extended: Path, why: str) -> PredictionError:
+    """Say that a model is not put into service and why, with the command that would all the same."""
+    files = [str(file.absolute()) for file in (config.path, extended)]
+    command = shlex.join(["impactcell", "model", "accept", *files, "--anyway"])
+    told = f"model {model.name} is not put into service (`{command}` would)"
+    return PredictionError(f"{config.name}: {told}: {why}")
 
 
 def put_into_service(config: CellConfig, model: Model) -> Path:
@@ -202,8 +219,10 @@ def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json:
         f"  {c['parameter']}: {_text(c['before'])} -> {_text(c['after'])}{_interval_text(c['ci95'])}"
         for c in changes
     ]
-    if own_taps is not None:
-        rows.append(own_taps.sentence)
+    origin = origin_of(after)
+    rows += [one.sentence for one in (own_taps, origin) if one is not None]
+    if origin is not None and origin.caution:
+        print_note(origin.caution)
     sharing = cells_sharing(cell_config)
     if sharing:
         rows.append(f"{cell_config.settings.model} is the model file of {', '.join(sharing)} too")
@@ -215,6 +234,8 @@ def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json:
             "changes": changes,
             "shared_with": list(sharing),
             "own_taps": None if own_taps is None else own_taps.content,
+            "verdict": None if origin is None else origin.verdict,
+            "caution": None if origin is None else origin.caution,
             "refused": None if refusal is None else str(refusal),
         },
         "\n".join([f"{cell_config.name}: {before.name} -> {after.name}", *rows]),

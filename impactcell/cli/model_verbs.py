@@ -21,7 +21,11 @@ def model_accept(
         bool, typer.Option("--dry-run", help="Only say what would change, or why it would be refused.")
     ] = False,
     anyway: Annotated[
-        bool, typer.Option("--anyway", help="Also if the cell's own last taps speak against it.")
+        bool,
+        typer.Option(
+            "--anyway",
+            help="Also if the cell's own last taps speak against it, or nothing tells its k, b or ratio.",
+        ),
     ] = False,
     as_json: AsJson = False,
 ) -> None:

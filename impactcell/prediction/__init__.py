@@ -4,6 +4,7 @@ from impactcell.prediction.calibration import calibrate
 from impactcell.prediction.estimate import estimate, estimate_from_features
 from impactcell.prediction.model import (
     PROVISIONAL,
+    REMAINS,
     DistanceForm,
     ForceForm,
     Model,
@@ -15,6 +16,7 @@ from impactcell.prediction.model import (
 
 __all__ = [
     "PROVISIONAL",
+    "REMAINS",
     "DistanceForm",
     "ForceForm",
     "Model",

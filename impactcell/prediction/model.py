@@ -108,6 +108,8 @@ class Predictor:
 
 PROVISIONAL: Final = "provisional"
 """In the provenance of a model that nothing was measured of."""
+REMAINS: Final = "what remains"
+"""In the provenance of a model of `discrepancy` beside whose effects something remains: how much, where."""
 
 
 @dataclass(frozen=True, slots=True)

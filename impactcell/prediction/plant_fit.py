@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from impactcell.features import Features
 from impactcell.prediction.estimate import estimate_from_features
 from impactcell.prediction.model import Model
+from impactcell.prediction.told_parameters import parameter_words
 from impactcell.records import Estimator, FrictionEstimate
-from impactcell.records.uncertainty import plus_minus
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +48,4 @@ class PlantFit:
     @property
     def sentence(self) -> str:
         """The parameters with what is told of their standard deviations."""
-        plant, prior = self.model.plant, self.model.prior
-        stiffness = plus_minus(plant.stiffness_n_per_m, prior.stiffness_std_n_per_m, ".6g", ".2g")
-        damping = plus_minus(plant.damping_n_s_per_m, prior.damping_std_n_s_per_m, ".5g", ".2g")
-        ratio = plus_minus(self.model.ratio, prior.ratio_std, ".4f", ".2g")
-        return f"k {stiffness} N/m, b {damping} N s/m, mu_k/mu_s {ratio} (± is 95 %)"
+        return f"{', '.join(parameter_words(self.model).values())} (± is 95 %)"

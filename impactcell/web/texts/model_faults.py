@@ -19,6 +19,20 @@ TEXTS: Final = {
     "{usable_before} sind es. Sind die Messungen aus dieser Zelle? Soll das Modell dennoch gelten: "
     "„{command}“.",
 }
+UNTOLD: Final = re.compile(
+    r"(?P<cell>.+?): model (?P<model>.+) is not put into service \(`(?P<command>[^`]+)` would\): what it was "
+    r"found in does not tell (?P<parameters>.+) \(± is 95 %\), and with such a prior .+"
+)
+UNTOLD_TEXTS: Final = {
+    "en": "{cell}: model {model} is not put into service: its measurements do not tell {parameters} (± is "
+    "95 %), and each tap would be estimated as if nothing were known of it. Record taps over more "
+    "velocities, slow ones too, which stick first; or offer the law that the report proposes as an effect. "
+    "If the model is meant all the same, “{command}” takes it.",
+    "de": "{cell}: Modell {model} wird nicht übernommen: seine Messungen zeigen nicht, wie groß {parameters} "
+    "ist (± gilt zu 95 %), und jeder Stoß würde geschätzt, als wäre darüber nichts bekannt. Stöße mit mehr "
+    "Geschwindigkeiten aufzeichnen, auch langsame, die erst haften; oder das Gesetz, das der Bericht "
+    "vorschlägt, als Effekt anbieten. Soll das Modell dennoch gelten: „{command}“.",
+}
 ALL_NOISE: Final = ("leaves no more than the sensors' noise", "leaves 1 times the sensors' noise")
 """What a model leaves that follows all; the second is of stored studies."""
 LEAVES: Final = re.compile(r"leaves (?P<gap>\S+) times the sensors' noise")
@@ -30,15 +44,26 @@ def model_fault(fault: str, language: str, named: Callable[[str], str] = str) ->
     >>> model_fault("p: the file is missing", "de") is None
     True
     """
-    match = REFUSED.fullmatch(fault)
+    untold = UNTOLD.fullmatch(fault)
+    match = untold or REFUSED.fullmatch(fault)
     if match is None:
         return None
     said = match.groupdict()
     said["model"] = named(said["model"])
+    if untold is not None:
+        if language == "de":
+            said["parameters"] = _german_numbers(said["parameters"])
+        return UNTOLD_TEXTS[language].format_map(said)
     said["command"] = said["command"] or "impactcell model accept --anyway"
     if language == "de":
         said |= {"after": _german(said["after"], " es"), "before": _german(said["before"], "")}
     return TEXTS[language].format_map(said)
+
+
+def _german_numbers(parameters: str) -> str:
+    """Write the parameters of a contact with the decimal commas and units of German."""
+    commas = re.sub(r"(?<=\d)\.(?=\d)", ",", parameters.replace(", ", " und "))
+    return commas.replace("mu_k/mu_s", "µk/µs")
 
 
 def _german(phrase: str, subject: str) -> str:

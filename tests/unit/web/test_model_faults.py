@@ -1,10 +1,14 @@
 """A model that is refused is told on the page in its language, from what `model accept` says."""
 
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from impactcell.cli.model_origin import untold_sentence
 from impactcell.cli.own_taps import OwnTaps
+from impactcell.settings.model_file import read_model
 from impactcell.web.messages import Messages
 
 COMMAND = "impactcell model accept '/srv/my cell.yaml' /srv/studies/7/results/model.extended.yaml --anyway"
@@ -52,3 +56,21 @@ def test_the_model_is_called_by_its_effects_in_words() -> None:
 )
 def test_taps_that_no_model_follows_are_said_to_be_such(language: str, said: str) -> None:
     assert said in Messages(language).fault(refusal(OwnTaps(5, math.nan, math.nan, 5, 1)))[1]
+
+
+def test_a_model_whose_contact_nothing_tells_is_refused_in_either_language() -> None:
+    model = read_model(Path("config/models/prototype.yaml"))
+    wide = replace(model, prior=replace(model.prior, stiffness_std_n_per_m=2.5e10, ratio_std=0.4))
+    why = untold_sentence(wide, model.prior)
+    fault = f"press-1: model oil is not put into service (`{COMMAND}` would): {why}"
+    language, german = Messages("de").fault(fault)
+    assert language == "de"
+    assert german.startswith(
+        "press-1: Modell oil wird nicht übernommen: seine Messungen zeigen nicht, wie groß k "
+    )
+    assert "± 5e+10 N/m und µk/µs " in german
+    assert "± 0,8 ist (± gilt zu 95 %)" in german
+    assert german.endswith(f"„{COMMAND}“.")
+    english = Messages("en").fault(fault)[1]
+    assert "its measurements do not tell k " in english
+    assert english.endswith(f"“{COMMAND}” takes it.")
