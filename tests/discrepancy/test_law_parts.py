@@ -1,5 +1,6 @@
 """Parts of the search for a law by themselves: covariates, their range, how a spline bends."""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,7 +13,9 @@ from impactcell.discrepancy.laws.condense import RankedForm
 from impactcell.discrepancy.laws.grammar import Shaped
 from impactcell.discrepancy.laws.law import LawParameter, write_law
 from impactcell.discrepancy.model.parameters import effect_coordinates
+from impactcell.physics.effects import LIBRARY, withdraw_effect
 from impactcell.physics.free_forms import FREE_FORMS
+from impactcell.physics.outside_effects import offer_effects
 
 
 def test_covariates_of_a_law_are_the_motions_own_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -142,3 +145,21 @@ def test_a_law_that_begins_at_nought_moves_on_the_scale_of_its_range(amplitude: 
         assert coordinate.value(start) == pytest.approx(parameter.first)
         assert coordinate.lower <= start <= coordinate.upper
         assert max(abs(coordinate.lower), abs(coordinate.upper)) <= 1e4
+
+
+def test_a_law_that_was_given_and_is_found_once_more_has_another_name(tmp_path: Path) -> None:
+    """The run with the law file that the one before wrote ended after minutes: the name was taken."""
+    place = next(form for form in FREE_FORMS.values() if form.covariate == "position" and form.is_factor)
+    atom = next(one for one in grammar.ATOMS if grammar.CENTRE in one.shapes)
+    shapes = tuple(0.00412 if shape is grammar.CENTRE else 0.0021 for shape in atom.shapes)
+    ranked = RankedForm((Shaped((atom,), (shapes,)),), (0.0234,), 50.0, 40.0, np.zeros(2))
+    given = write_law(place, ranked, ((-0.01, 0.01),))
+    (tmp_path / f"{given.identifier}.py").write_text(given.text(), encoding="utf-8")
+    offer_effects([tmp_path])
+    try:
+        found = write_law(place, ranked, ((-0.01, 0.01),))
+        assert found.effect().identifier == found.identifier == f"{given.identifier}_2"
+        assert LIBRARY[given.identifier] is not found.effect()
+    finally:
+        withdraw_effect(given.identifier)
+    assert write_law(place, ranked, ((-0.01, 0.01),)).identifier == given.identifier

@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, count
 
 from impactcell.discrepancy.laws.condense import RankedForm
 from impactcell.discrepancy.laws.effect_file import effect_file
@@ -207,8 +208,14 @@ def write_law(place: FreeForm, ranked: RankedForm, tested: tuple[tuple[float, fl
             LawParameter("range_m", "m", math.nan, 1e-3 * reference, MANY * reference, reference)
         )
     digest = hashlib.sha256(f"{form_name} {parameters}".encode()).hexdigest()[:8]
-    identifier = f"{place.effect.identifier.replace('free_', 'law_of_', 1)}_{digest}"
+    identifier = _not_given(f"{place.effect.identifier.replace('free_', 'law_of_', 1)}_{digest}")
     return Law(identifier, place, form_name, " + ".join(pieces), tuple(parameters), tested)
+
+
+def _not_given(identifier: str) -> str:
+    """Give a name of that stem that no effect on offer has: a law that was given may be found once more."""
+    numbered = (f"{identifier}_{number}" for number in count(2))
+    return next(name for name in chain([identifier], numbered) if name not in LIBRARY)
 
 
 class _OfCovariate:
