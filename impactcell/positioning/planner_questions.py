@@ -20,8 +20,11 @@ USUAL_WAY_M = 0.2
 FASTEST_M_S = 1.0
 """Faster no cell taps whose own limit is not above it: mm/s or mm/min have been given. Our choice."""
 FURTHER = 20.0
-"""Times what a part slides at the speed of its actuator, v²/(2 mu_k g), and the stroke: beyond it no tap
+"""Times what a part slides at the speed of its actuator, v²/(2 mu_k g), beside the stroke: beyond it no tap
 moves one. The springiest contact gives it four times as much."""
+FURTHER_PUSHED = 2.0
+"""Times the stroke that a part may seem to have been pushed: stroke and scale of a sensor may be off, and 8 %
+of scatter of a displacement are within what a planner is to learn from."""
 LONGEST_M = 0.1
 """In place of the stroke where the actuator halts at loss of contact: how far a part may be pushed before."""
 BACK_M = 1e-4
@@ -113,7 +116,7 @@ def check_observation(tap: Tap, moved_m: float, mass_kg: float, slowing_m_s2: fl
             "position has changed by, times the tap's direction, and nothing where a hand has moved the part"
         )
     stroke_m = tap.stroke_m if tap.stroke_m < math.inf else LONGEST_M
-    furthest_m = FURTHER * tap.velocity_m_s**2 / (2.0 * slowing_m_s2) + stroke_m
+    furthest_m = FURTHER * tap.velocity_m_s**2 / (2.0 * slowing_m_s2) + FURTHER_PUSHED * stroke_m
     if moved_m > furthest_m:
         way_out = meant_in(moved_m, {"mm": 1e-3, "µm": 1e-6}, (0.0, furthest_m))
         raise PositioningError(

@@ -239,9 +239,12 @@ def test_nothing_is_learned_from_a_displacement_that_no_tap_makes(
 @pytest.mark.parametrize("mu_k", [0.02, 0.19])
 @pytest.mark.parametrize("velocity_m_s", [0.005, 0.1, 1.0])
 def test_what_the_springiest_contact_makes_of_a_tap_is_learned_from(mu_k: float, velocity_m_s: float) -> None:
-    """It leaves at twice the actuator's speed; an encoder that scatters may show a part a little behind."""
+    """It leaves at twice the actuator's speed; an encoder that scatters may show a part a little behind.
+
+    A displacement that scatters by 8 % was refused after a slow push, three of its deviations on.
+    """
     tap, furthest = Tap(velocity_m_s, 1.5e-3), 4.0 * velocity_m_s**2 / (2.0 * mu_k * 9.81) + 1.5e-3
-    for moved in (furthest, -2e-5):
+    for moved in (furthest, 1.3 * furthest, -2e-5):
         planner = TapPlanner(plant={"mu_k": mu_k})
         before = planner.posterior
         planner.observe(tap, moved, 18.9)
