@@ -13,7 +13,7 @@ from impactcell.errors import PhysicsError, PredictionError
 from impactcell.physics import Plant
 from impactcell.prediction import REMAINS, Model
 from impactcell.prediction.model import Prior
-from impactcell.prediction.told_parameters import parameter_words, untold
+from impactcell.prediction.told_parameters import parameters_in_words, untold
 from impactcell.settings.model_file import write_model, write_part_of_model
 
 LEAST_SHARE = 0.005
@@ -81,9 +81,8 @@ def _extended_model(result: DiscrepancyResult, data: Campaign, source: str, nomi
         provenance=provenance,
     )
     if names := untold(model, None if nominal is None else nominal.prior):
-        words = parameter_words(model)
-        told = f"{', '.join(words[name] for name in names)} (± is 95 %)"
-        model = replace(model, provenance={**provenance, "not told, so of no use in a cell": told})
+        told = {"not told, so of no use in a cell": parameters_in_words(model, names)}
+        model = replace(model, provenance={**provenance, **told})
     if data.excitation is not Excitation.TAP:
         return model
     fitted = {shot.number for shot in result.prepared.shots}

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from impactcell.cell import in_place_of
 from impactcell.cli.calibrate import calibrated_model
-from impactcell.cli.model_origin import origin_of, untold_sentence
+from impactcell.cli.model_origin import ModelOrigin, origin_of, untold_sentence
 from impactcell.cli.own_taps import OwnTaps, compare_on_own_taps
 from impactcell.cli.paths import check_output
 from impactcell.cli.shared_model import cells_sharing, note_sharing
@@ -57,9 +57,7 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
     for finding in judge_cell(read_cell(cell)):
         if finding.is_fault:
             print_note(str(finding))
-    origin = origin_of(model)
-    if origin is not None and origin.caution:
-        print_note(origin.caution)
+    origin = _origin_with_caution(model)
     _tell(
         {
             "cell": cell_config.name,
@@ -75,6 +73,14 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
         + "".join(f"\n{one.sentence}" for one in (own_taps, origin) if one is not None),
         as_json=as_json,
     )
+
+
+def _origin_with_caution(model: Model) -> ModelOrigin | None:
+    """Give what was established as a model was found, and print the caution that goes with it."""
+    origin = origin_of(model)
+    if origin is not None and origin.caution:
+        print_note(origin.caution)
+    return origin
 
 
 def _judged(config: CellConfig, extended: Path, *, anyway: bool) -> tuple[Model, OwnTaps | None]:
@@ -219,10 +225,8 @@ def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json:
         f"  {c['parameter']}: {_text(c['before'])} -> {_text(c['after'])}{_interval_text(c['ci95'])}"
         for c in changes
     ]
-    origin = origin_of(after)
+    origin = _origin_with_caution(after)
     rows += [one.sentence for one in (own_taps, origin) if one is not None]
-    if origin is not None and origin.caution:
-        print_note(origin.caution)
     sharing = cells_sharing(cell_config)
     if sharing:
         rows.append(f"{cell_config.settings.model} is the model file of {', '.join(sharing)} too")

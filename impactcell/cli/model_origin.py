@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from impactcell.prediction import REMAINS, Model, Prior
-from impactcell.prediction.told_parameters import parameter_words, untold
+from impactcell.prediction.told_parameters import parameters_in_words, untold
 
 VERDICTS: Final = {
     "no_gap": "nothing is missing in it",
@@ -55,9 +55,8 @@ def untold_sentence(model: Model, before: Prior) -> str:
     names = untold(model, before)
     if not names:
         return ""
-    words = parameter_words(model)
     return (
-        f"what it was found in does not tell {', '.join(words[name] for name in names)} (± is 95 %), and "
+        f"what it was found in does not tell {parameters_in_words(model, names)}, and "
         "with such a prior each tap is fitted as if nothing were known; record taps over more velocities, "
         "slow ones too, which stick first, or give the law that its report proposes, `impactcell discrepancy "
         "CAMPAIGN --effects LAW.py -o DIR`; until then the model in service stays"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from impactcell.features import Features
 from impactcell.prediction.estimate import estimate_from_features
 from impactcell.prediction.model import Model
-from impactcell.prediction.told_parameters import parameter_words
+from impactcell.prediction.told_parameters import parameters_in_words
 from impactcell.records import Estimator, FrictionEstimate
 
 
@@ -48,4 +48,4 @@ class PlantFit:
     @property
     def sentence(self) -> str:
         """The parameters with what is told of their standard deviations."""
-        return f"{', '.join(parameter_words(self.model).values())} (± is 95 %)"
+        return parameters_in_words(self.model)

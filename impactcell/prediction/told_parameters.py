@@ -1,6 +1,7 @@
 """Which parameters of a model's contact are told, and in what words: so wide a prior is none."""
 
 import math
+from collections.abc import Collection
 from typing import Final
 
 from impactcell.prediction.model import Model, Prior
@@ -15,17 +16,19 @@ SMALLEST_DAMPING_RATIO: Final = 0.01
 of its own that its standard deviation could be compared with."""
 
 
-def parameter_words(model: Model) -> dict[str, str]:
-    """Say each parameter of the contact with what is told of its standard deviation, by its name."""
+def parameters_in_words(model: Model, names: Collection[str] | None = None) -> str:
+    """Say the parameters of the contact, or those named, with what is told of their standard deviations."""
     plant, prior = model.plant, model.prior
     stiffness = plus_minus(plant.stiffness_n_per_m, prior.stiffness_std_n_per_m, ".6g", ".2g")
     damping = plus_minus(plant.damping_n_s_per_m, prior.damping_std_n_s_per_m, ".5g", ".2g")
     ratio = plus_minus(model.ratio, prior.ratio_std, ".4f", ".2g")
-    return {
+    words = {
         "stiffness_n_per_m": f"k {stiffness} N/m",
         "damping_n_s_per_m": f"b {damping} N s/m",
         "ratio": f"mu_k/mu_s {ratio}",
     }
+    told = [said for name, said in words.items() if names is None or name in names]
+    return f"{', '.join(told)} (± is 95 %)"
 
 
 def untold(model: Model, before: Prior | None = None) -> tuple[str, ...]:

@@ -48,7 +48,7 @@ def test_settings_that_differ_are_no_replicates() -> None:
     shots = at([25.0, 25.0001, 25.0, 25.0, 25.0])
     shots[2], shots[3] = replace(shots[2], mass_kg=10.1), replace(shots[3], direction=-1)
     shots[4] = replace(shots[4], velocity_m_s=math.nan)
-    assert replicate_groups(shots) == [0, 0, 1, 2, 3]
+    assert replicate_groups(shots, start_places(shots)) == [0, 0, 1, 2, 3]
 
 
 def test_a_start_that_was_measured_leaves_the_groups_as_they_are() -> None:

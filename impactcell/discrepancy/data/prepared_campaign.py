@@ -108,7 +108,8 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         raise CampaignError(message)
     batches = tuple(dict.fromkeys(capture.batch_id or "" for capture, _ in captures))
     recorded = [capture for capture, _ in captures]
-    groups = replicate_groups(recorded) if strategy.has_replicates else [*range(len(recorded))]
+    places = start_places(recorded)
+    groups = replicate_groups(recorded, places) if strategy.has_replicates else [*range(len(recorded))]
     shots = []
     for (capture, record), group in zip(captures, groups, strict=True):
         batch = batches.index(capture.batch_id or "")
@@ -122,7 +123,7 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
         shots = without_clipped_samples(shots, data_faults, notes)
     shots = strategy.with_unstated_masses(shots)
     covariates = _varying_covariates(strategy, shots)
-    if strategy.has_replicates and not any(start_places(recorded)):
+    if strategy.has_replicates and not any(places):
         covariates = tuple(name for name in covariates if name != "start")  # it was measured, and is one
     return PreparedCampaign(
         strategy,

@@ -28,12 +28,15 @@ def start_places(captures: Sequence[Capture]) -> list[int]:
     return places
 
 
-def replicate_groups(captures: Sequence[Capture]) -> list[int]:
-    """Give the number of each shot's group, in order of appearance: those of one have the same settings."""
+def replicate_groups(captures: Sequence[Capture], places: Sequence[int]) -> list[int]:
+    """Give the number of each shot's group, in order of appearance: those of one have the same settings.
+
+    `places` are those at which the shots start.
+    """
     groups: dict[tuple[float, ...], int] = {}
     return [
         groups.setdefault((*_told(capture), place), len(groups))
-        for capture, place in zip(captures, start_places(captures), strict=True)
+        for capture, place in zip(captures, places, strict=True)
     ]
 
 

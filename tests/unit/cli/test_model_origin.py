@@ -14,17 +14,8 @@ from impactcell.prediction import REMAINS, Model
 from impactcell.settings import read_cell
 from impactcell.settings.model_file import read_model, write_model
 from tests.integration.processes import CONFIG
+from tests.own_cell import CELL
 
-CELL = """
-format: 1
-cell: own
-module: {{host: 127.0.0.1, port: 5020, register_map: {maps}/fpga-v1.yaml}}
-model: model.yaml
-part: {{mass_kg: 18.9}}
-actuator: {{stroke_mm: 1.5}}
-alarms: {{wear_limit: 0.25}}
-opcua: {{users_file: users.yaml}}
-"""
 GAPS = {"held-out gap before": "3.588", "held-out gap after": "1.02"}
 
 

@@ -23,23 +23,14 @@ from impactcell.physics.outside_effects import offer_effects
 from impactcell.prediction import Model
 from impactcell.settings import read_cell
 from impactcell.settings.model_file import read_model, write_model
+from tests import own_cell
 from tests.integration.processes import CONFIG
 from tests.snapshots import make_snapshot
 from tests.taps import Tap
 
 pytestmark = pytest.mark.slow
 
-CELL = """
-format: 1
-cell: own
-module: {{host: 127.0.0.1, port: 5020, register_map: {maps}/fpga-v1.yaml}}
-model: model.yaml
-part: {{mass_kg: 18.9}}
-actuator: {{stroke_mm: 1.5}}
-alarms: {{wear_limit: 0.25}}
-opcua: {{users_file: users.yaml}}
-journal: {{file: own.sqlite}}
-"""
+CELL = own_cell.CELL + "journal: {{file: own.sqlite}}\n"
 
 
 def oily(model: Model) -> Model:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from impactcell.prediction.told_parameters import parameter_words, untold
+from impactcell.prediction.told_parameters import parameters_in_words, untold
 from impactcell.settings.model_file import read_model
 
 MODEL = read_model(Path("config/models/prototype.yaml"))
@@ -40,4 +40,6 @@ def test_damping_of_none_is_told_by_how_little_it_can_be() -> None:
 
 def test_a_parameter_is_said_with_what_95_per_cent_hold() -> None:
     wide = replace(MODEL, prior=replace(MODEL.prior, stiffness_std_n_per_m=2.5e10))
-    assert parameter_words(wide)["stiffness_n_per_m"].endswith(" ± 5e+10 N/m")
+    said = parameters_in_words(wide, ("stiffness_n_per_m",))
+    assert said.startswith("k ")
+    assert said.endswith(" ± 5e+10 N/m (± is 95 %)")
