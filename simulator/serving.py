@@ -169,7 +169,8 @@ async def _serve(scenario: Scenario, device: Device, stop: asyncio.Event) -> Non
             device.update(loop.time())
             nap_s = min(max(device.due_s - loop.time(), 0.0), LONGEST_NAP_S)
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(stop.wait(), nap_s)
+                async with asyncio.timeout(nap_s):
+                    await stop.wait()
 
 
 def run(

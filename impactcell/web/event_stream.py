@@ -82,7 +82,8 @@ class EventStream:
                 await _send(send, body or b"event: alive\ndata: {}\n\n")
                 await asyncio.sleep(FRAME_S)
                 with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(changed.wait(), HEARTBEAT_S)
+                    async with asyncio.timeout(HEARTBEAT_S):
+                        await changed.wait()
             await _send(send, b"", more=False)
         finally:
             self._feed.unsubscribe(changed)

@@ -69,7 +69,8 @@ class _Server(uvicorn.Server):
             if self._watch is not None:
                 self._watch.look(datetime.now(UTC))
             with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._ending.wait(), DATE_S)
+                async with asyncio.timeout(DATE_S):
+                    await self._ending.wait()
 
 
 class PageServer:

@@ -124,6 +124,21 @@ async def test_a_slow_viewer_misses_frames_and_never_the_last(feed: LiveFeed) ->
     await quick.leave()
 
 
+@pytest.mark.parametrize("steps", range(10))
+async def test_who_leaves_as_news_come_has_left(feed: LiveFeed, steps: int) -> None:
+    viewer = Viewer(feed)
+    feed.put(CellNews(CELL, cycle(1)))
+    await viewer.until_cycle(1)
+    for _ in range(20):  # past the rest between two frames: it waits for news
+        await asyncio.sleep(0)
+    feed.put(CellNews(CELL, cycle(2)))
+    for _ in range(steps):
+        await asyncio.sleep(0)
+    async with asyncio.timeout(PATIENCE_S):
+        await viewer.leave()
+    assert feed.viewers == 0
+
+
 async def test_a_viewer_who_takes_nothing_is_let_go(feed: LiveFeed, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(event_stream, "STALLED_S", 0.0)
     viewer = Viewer(feed, reads=1)
