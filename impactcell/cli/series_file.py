@@ -11,7 +11,13 @@ from pathlib import Path
 from impactcell.cell.series_replay import whole_number_fault
 from impactcell.errors import MeasurementError, SeriesError
 from impactcell.measurements.dialect import Dialect, decode, detect, split_cells
-from impactcell.measurements.lines_left_out import HEADER_AGAIN, left_out
+from impactcell.measurements.lines_left_out import (
+    HEADER_AGAIN,
+    LONGEST_FOOTER,
+    footer_note,
+    is_word,
+    left_out,
+)
 from impactcell.measurements.numbers import is_grouped, is_missing, parse_number
 from impactcell.measurements.text_layout import is_comment
 from impactcell.measurements.units import parse_unit
@@ -84,9 +90,12 @@ def read_series(path: Path) -> SeriesFile:
     faults: list[str] = []
     is_longer = False
     rows, notes = list(_rows(path, lines, head + 1, delimiter)), []
-    if len(rows) > 1 and len(rows[-1][1]) < len(header) <= len(rows[-2][1]):
-        line, cut = rows.pop()
-        notes.append(f"{path}:{line}: left out, {left_out(delimiter.join(cut), len(cut), len(header))}")
+    footer = _footer(rows, names, header.index("cycle"), decimal)
+    if not footer and len(rows) > 1 and len(rows[-1][1]) < len(header) <= len(rows[-2][1]):
+        footer = rows[-1:]
+    if footer:
+        rows = rows[: -len(footer)]
+        notes.append(_left_out(path, footer, delimiter, len(header)))
     for line, row in rows:
         if row == names:
             faults.append(f"{path}:{line}: {HEADER_AGAIN}")
@@ -181,6 +190,28 @@ def _rows(path: Path, lines: Sequence[str], first: int, delimiter: str) -> Itera
         cells = [cell.strip() for cell in row]
         if any(cells):
             yield line, cells
+
+
+def _footer(
+    rows: Sequence[tuple[int, list[str]]], names: Sequence[str], numbered: int, decimal: str
+) -> Sequence[tuple[int, list[str]]]:
+    """Give the rows of words at the end: none has a number where cycles have theirs. As `import` does."""
+    count = 0
+    for _, row in reversed(rows[1:]):
+        if not is_word(row[numbered if numbered < len(row) else 0], decimal):
+            break
+        count += 1
+        if count > LONGEST_FOOTER or row == names:
+            return ()
+    return rows[len(rows) - count :]
+
+
+def _left_out(path: Path, footer: Sequence[tuple[int, list[str]]], delimiter: str, width: int) -> str:
+    """Say which rows at the end are left out."""
+    line, row = footer[0]
+    if len(footer) == 1:
+        return f"{path}:{line}: left out, {left_out(delimiter.join(row), len(row), width)}"
+    return f"{path}: {footer_note([(line, delimiter.join(row)) for line, row in footer])}"
 
 
 def _cells(header: Sequence[str], row: list[str]) -> tuple[dict[str, str], list[str]]:

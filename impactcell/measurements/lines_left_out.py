@@ -35,15 +35,13 @@ def footer_begin(lines: Sequence[str], layout: Layout, dialect: Dialect) -> int:
     A word that stands for a lost value is no such, nor is the header that comes again, nor what begins as a
     number does. The number of lines where there is no footer.
     """
-    lost: AbstractSet[str] = dialect.lost
     header = None if layout.header_line is None else lines[layout.header_line - 1].strip()
     begin, count = len(lines), 0
     for index in range(len(lines) - 1 if 0 in layout.numeric else -1, layout.first_row, -1):
         if is_comment(lines[index]):
             continue
         cell = split_cells(lines[index], dialect.delimiter or ",")[0].strip()
-        is_word = parse_number(cell, dialect.decimal or ".") is None and not _begins_as_number(cell)
-        if not is_word or is_missing(cell) or cell.lower() in lost:
+        if not is_word(cell, dialect.decimal or ".", dialect.lost):
             break
         begin, count = index, count + 1
         if count > LONGEST_FOOTER or lines[index].strip() == header:
@@ -51,14 +49,24 @@ def footer_begin(lines: Sequence[str], layout: Layout, dialect: Dialect) -> int:
     return begin
 
 
-def footer_note(lines: Sequence[str], begin: int) -> str:
-    """Say which lines are a footer, and how they begin."""
-    places = [index for index in range(begin, len(lines)) if not is_comment(lines[index])]
-    told = ", ".join(_shown(lines[index]) for index in places[:LINES_SHOWN])
-    more = ", ..." if len(places) > LINES_SHOWN else ""
-    if len(places) == 1:
-        return f"line {begin + 1} left out, the last line, and no row of the table: {told}"
-    return f"lines {begin + 1} to {places[-1] + 1} left out, below the table and no rows of it: {told}{more}"
+def is_word(cell: str, decimal: str, lost: AbstractSet[str] = frozenset()) -> bool:
+    """Whether a cell where a table has numbers has a word: none for a lost value, no begin of a number.
+
+    >>> [is_word(cell, ".") for cell in ("Mean: 0.2", "1.5.2026", "n/a", "")]
+    [True, False, False, False]
+    """
+    is_number = parse_number(cell, decimal) is not None or _begins_as_number(cell)
+    return not (is_number or is_missing(cell) or cell.lower() in lost)
+
+
+def footer_note(footer: Sequence[tuple[int, str]]) -> str:
+    """Say which lines are a footer, given each with its number, and how they begin."""
+    told = ", ".join(_shown(line) for _, line in footer[:LINES_SHOWN])
+    more = ", ..." if len(footer) > LINES_SHOWN else ""
+    first, last = footer[0][0], footer[-1][0]
+    if len(footer) == 1:
+        return f"line {first} left out, the last line, and no row of the table: {told}"
+    return f"lines {first} to {last} left out, below the table and no rows of it: {told}{more}"
 
 
 def _shown(line: str) -> str:

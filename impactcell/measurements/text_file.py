@@ -53,7 +53,8 @@ def read_text(path: Path, limits: Limits, given: Dialect) -> tuple[Table, ...]:
     limits.check_shape(source, len(lines) - layout.first_row, len(layout.names))
     watch, found = ThousandsWatch(decimal), replace(given, delimiter=delimiter, decimal=decimal)
     end = footer_begin(lines, layout, found)
-    below = [footer_note(lines, end)] if end < len(lines) else []
+    footer = [(end + at, line) for at, line in enumerate(lines[end:], 1) if not is_comment(line)]
+    below = [footer_note(footer)] if footer else []
     lines = lines[:end]
     rows = _Rows(source, lines, layout, found, watch)
     columns, numbers = rows.read()

@@ -526,7 +526,12 @@ def test_a_standard_deviation_of_0_is_told_with_the_rows_that_have_it(tmp_path, 
 
 @pytest.mark.parametrize(
     ("last", "told"),
-    [("60,0.2", "cut off after 2 of 3 cells: '60,0.2'"), ("the end\n", "no row of the table: 'the end'")],
+    [
+        ("60,0.2", "cut off after 2 of 3 cells: '60,0.2'"),
+        ("the end\n", "no row of the table: 'the end'"),
+        ("# end\n,,\n", "no row of the table: '# end'"),
+        ("Mean,0.2,0.002\n", "the last line, and no row of the table: 'Mean,0.2,0.002'"),
+    ],
 )
 def test_a_last_line_that_is_no_row_is_left_out_and_told(tmp_path, capsys, last, told):
     path = write(tmp_path / "s.csv", truth(60, at=0))
@@ -537,6 +542,35 @@ def test_a_last_line_that_is_no_row_is_left_out_and_told(tmp_path, capsys, last,
     assert json.loads(seen.out) == expected
     assert f"{path}:62: left out, " in seen.err
     assert told in seen.err
+
+
+def test_lines_of_words_below_a_series_are_left_out_and_told(tmp_path, capsys):
+    """Each was a fault of its own, and nothing was tracked; `import` leaves them out and names them."""
+    path = write(tmp_path / "s.csv", truth(60, at=0))
+    expected = run(capsys, path)
+    path.write_text(path.read_text() + "\nMean,0.2,0.002\nMax,0.21,\n# by hand\nOperator: M. Meier\n")
+    track(path, as_json=True)
+    seen = capsys.readouterr()
+    assert json.loads(seen.out) == expected
+    assert (
+        f"{path}: lines 63 to 66 left out, below the table and no rows of it: 'Mean,0.2,0.002', "
+        "'Max,0.21,', '# by hand', ...\n" in seen.err
+    )
+
+
+@pytest.mark.parametrize(
+    ("end", "fault"),
+    [
+        ("n/a,0.2,0.002\n", ":62: cycle `n/a` is not a whole number"),
+        ("Mean,0.2,0.002\n61,0.2,0.002\n", ":62: cycle `Mean` is not a whole number"),
+        ("Mean,0.2,0.002\n" * 31, ":62: cycle `Mean` is not a whole number"),
+    ],
+)
+def test_no_cycle_is_taken_for_a_line_below_the_series(tmp_path, end, fault):
+    path = write(tmp_path / "s.csv", truth(60, at=0))
+    path.write_text(path.read_text() + end)
+    with pytest.raises(SeriesError, match=fault):
+        track(path)
 
 
 def test_a_header_that_comes_again_is_one_fault(tmp_path):
