@@ -26,6 +26,7 @@ from impactcell.scada import (
     default_application_uri,
 )
 from impactcell.settings import CellConfig
+from impactcell.settings.exposed_files import files_granting_access
 from impactcell.settings.sections import JournalSection
 from impactcell.settings.web_section import WebSection
 from impactcell.tracking.signature.tracker import SignatureSettings
@@ -141,6 +142,7 @@ def cell_facts(cell: CellConfig, endpoint: str) -> CellFacts:
         cell.path.resolve(),
         None if cell.settings.actuator.stroke_mm is None else cell.settings.actuator.stroke_mm * MM,
         cell.settings.positioning is not None,
+        access_files=tuple((what, file) for _, what, file in files_granting_access(cell.settings)),
     )
 
 

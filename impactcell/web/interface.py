@@ -73,6 +73,8 @@ class CellFacts:
         Whether it places parts, beside watching.
     tour : sequence of TourStop
         What happens in a cell that is a demo; empty in a real one.
+    access_files : sequence of str and Path
+        Files that grant access, each with what it is: `users file` or `private key`.
     """
 
     name: str
@@ -83,6 +85,7 @@ class CellFacts:
     stroke_m: float | None = None
     has_positioning: bool = False
     tour: Sequence[TourStop] = ()
+    access_files: Sequence[tuple[str, Path]] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,7 @@
 """The system: links, journals, users, and certificates that wait to be trusted."""
 
+import shlex
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +12,7 @@ from starlette.responses import RedirectResponse, Response
 from impactcell.alarms.rules import journal_fault
 from impactcell.errors import AccessError
 from impactcell.opcua.certificate_files import der, read_certificate, thumbprint
+from impactcell.process.file_access import what_others_can
 from impactcell.records import Alarm, ModuleStatus
 from impactcell.scada import RefusedError, Role
 from impactcell.scada.users import User, read_users
@@ -45,8 +48,22 @@ class RefusedCertificate:
     valid_until: str
 
 
+@dataclass(frozen=True, slots=True)
+class ExposedFile:
+    """A file that grants access, and what others than its owner can do with it: `read`, `write`."""
+
+    what: str
+    path: Path
+    can: tuple[str, ...]
+
+    @property
+    def way_out(self) -> str:
+        """Command that closes it."""
+        return f"chmod 600 {shlex.quote(str(self.path))}"
+
+
 async def system(context: PageContext, request: Request, session: BrowserSession) -> Response:
-    """Show the system; users and certificates only to engineers."""
+    """Show the system; users, certificates and files that are open to others only to engineers."""
     views = context.feed.views
     sizes = await context.past.run(lambda: [_size(facts.journal) for facts in context.content.cells])
     cells = [
@@ -55,9 +72,11 @@ async def system(context: PageContext, request: Request, session: BrowserSession
     ]
     users: list[User] = []
     certificates: list[RefusedCertificate] = []
+    exposed: list[ExposedFile] = []
     if session.actor.role >= Role.ENGINEER:
         users = await context.past.run(lambda: _users(context.settings.users))
         certificates = await context.past.run(lambda: refused_certificates(context.settings.certificates))
+        exposed = await context.past.run(lambda: _exposed_files(context.content.cells))
     return context.page(
         request,
         "system.html.j2",
@@ -65,6 +84,7 @@ async def system(context: PageContext, request: Request, session: BrowserSession
         systems=cells,
         users=users,
         certificates=certificates,
+        exposed=exposed,
         viewers=context.feed.viewers,
         now_ns=context.now_ms() * 1_000_000,
     )
@@ -97,6 +117,12 @@ def _refused(certificate: Certificate) -> RefusedCertificate:
         thumbprint(der(certificate)),
         f"{certificate.not_valid_after_utc:%Y-%m-%d}",
     )
+
+
+def _exposed_files(cells: Sequence[CellFacts]) -> list[ExposedFile]:
+    """List the files that grant access and are open to others, as they are now; cells may share them."""
+    files = dict.fromkeys(file for facts in cells for file in facts.access_files)
+    return [ExposedFile(what, path, can) for what, path in files if (can := what_others_can(path))]
 
 
 def _users(path: Path) -> list[User]:

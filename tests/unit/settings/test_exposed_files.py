@@ -8,6 +8,7 @@ import pytest
 
 from impactcell.cli.check import check
 from impactcell.service import service
+from impactcell.service.factory import cell_facts
 from impactcell.settings import read_cell
 from impactcell.settings.exposed_files import exposed_files
 from tests.unit.settings.test_impossible_paths import cell_file
@@ -70,6 +71,15 @@ def test_a_private_key_open_to_others_is_told(
     assert told == is_open * [
         f"others than its owner can read the private key {tmp_path / file}: run `chmod 600 {tmp_path / file}`"
     ]
+
+
+def test_the_page_is_told_which_files_grant_access(tmp_path: Path) -> None:
+    """It looks at their modes as somebody looks at it."""
+    (tmp_path / "key.pem").touch()
+    (tmp_path / "cert.pem").touch()
+    facts = cell_facts(read_cell(cell_file(tmp_path, "web.certificate", "cert.pem, key: key.pem")), "")
+    assert ("private key", tmp_path / "key.pem") in facts.access_files
+    assert [what for what, _ in facts.access_files] == ["users file", "private key", "private key"]
 
 
 def test_a_service_that_starts_warns_of_it_once(

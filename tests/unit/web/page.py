@@ -165,7 +165,10 @@ def make_page(
     settings = PageSettings(ADDRESS, users, directory / "pki", studies_dir, public_url=public_url)
     feed = LiveFeed([CELL])
     feed.start()
-    facts = CellFacts(CELL, "127.0.0.1:502", "opc.tcp://127.0.0.1:4840", journal, tour=tour)
+    access_files = (("users file", users), ("private key", settings.certificates / "key.pem"))
+    facts = CellFacts(
+        CELL, "127.0.0.1:502", "opc.tcp://127.0.0.1:4840", journal, tour=tour, access_files=access_files
+    )
     studies = StudyQueue(StudyStore(settings.studies), {CELL: directory / "press-1.yaml"}, verbs or Verbs())
     sessions = SessionTable(Users(users), clock)
     app = page_app(settings, PageContent((facts,)), feed, sessions, backend, studies)

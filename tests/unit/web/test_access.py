@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import os
 import re
 from collections.abc import AsyncIterator
 from dataclasses import replace
@@ -326,6 +327,30 @@ async def test_users_and_certificates_are_shown_to_engineers_only(page: Page) ->
             text = (await client.get("/system")).text
         others = [name for other, name in NAMES.items() if other is not role]
         assert all((name in text) == (role is Role.ENGINEER) for name in others)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="modes tell of access on POSIX only")
+async def test_files_open_to_others_are_shown_to_engineers_while_they_are(page: Page) -> None:
+    """Only the log told of them, once at the service's start; an observer learns no path."""
+    key = page.users.parent / "pki" / "key.pem"
+    key.parent.mkdir()
+    key.touch()
+    page.users.chmod(0o666)
+    key.chmod(0o644)
+    for role in Role:
+        async with page.logged_in(role) as client:
+            english, german = [(await client.get(f"/system?lang={code}")).text for code in ("en", "de")]
+        assert (f"can read and write the users file: <code>{page.users}</code>" in english) == (
+            role is Role.ENGINEER
+        )
+        assert (str(key) in english) == (role is Role.ENGINEER)
+    assert f"können die Benutzerdatei lesen und ändern: <code>{page.users}</code>" in german
+    assert f"können den privaten Schlüssel lesen: <code>{key}</code>" in german
+    assert f"Abhilfe: <code>chmod 600 {key}</code>" in german
+    page.users.chmod(0o600)
+    key.chmod(0o600)
+    async with page.logged_in(Role.ENGINEER) as client:
+        assert "chmod" not in (await client.get("/system")).text
 
 
 async def test_an_observer_is_offered_nothing_to_do(page: Page) -> None:
