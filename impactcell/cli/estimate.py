@@ -13,6 +13,7 @@ from typing import TextIO
 from impactcell.api.friction import calibrated_where_possible, with_masses
 from impactcell.campaign import Campaign, Excitation, from_contact, naming, read
 from impactcell.cli.direction_note import note_of_direction
+from impactcell.cli.estimate_columns import COLUMNS
 from impactcell.cli.free_slides import estimate_free_slides, no_estimate
 from impactcell.cli.paths import check_output
 from impactcell.discrepancy.data import (
@@ -31,12 +32,6 @@ from impactcell.process.progress import progress
 from impactcell.process.whole_files import write_whole
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import FrictionEstimate, Quality, as_recorded
-
-COLUMNS = (
-    "shot", "mu_s_force", "mu_s_distance", "mu_s_combined", "mu_s", "mu_s_std", "mu_k", "mu_k_std",
-    "mu_s_force_std", "mu_s_distance_std", "mu_s_combined_std", "estimator", "quality", "mu_k_quality",
-    "peak_force_n", "sliding_distance_m", "gap", "reason", "mu_s_common_std",
-)  # fmt: skip
 
 WORDS = ("estimator", "quality", "mu_k_quality", "reason")
 """Columns that are no numbers."""

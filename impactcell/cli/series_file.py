@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from impactcell.cell.series_replay import whole_number_fault
+from impactcell.cli.estimate_columns import COLUMNS as ESTIMATED
 from impactcell.errors import MeasurementError, SeriesError
 from impactcell.measurements.dialect import Dialect, decode, detect, split_cells
 from impactcell.measurements.lines_left_out import (
@@ -57,7 +58,7 @@ class SeriesFile:
     has_batch : bool
         There is a column `batch`.
     unread : tuple of str
-        Names of columns that are none of `COLUMNS`.
+        Names of columns that are none of `COLUMNS`, nor written by `impactcell estimate`.
     notes : tuple of str
         What was left out, with its line.
     """
@@ -116,7 +117,7 @@ def read_series(path: Path) -> SeriesFile:
         raise SeriesError("\n".join([*faults[:MOST_FAULTS], *more]))
     if not readings:
         raise SeriesError(f"{path}:{head + 2}: no cycles after the header")
-    unread = tuple(name for name in header if name and name not in COLUMNS)
+    unread = tuple(name for name in header if name and name not in (*COLUMNS, *_of_estimate(header)))
     return SeriesFile(tuple(readings), "batch" in header, unread, tuple(notes))
 
 
@@ -150,6 +151,11 @@ def _header(place: str, line: str) -> tuple[str, list[str]]:
         if header.count(name) > 1:
             raise SeriesError(f"{place}: column `{name}` is there {header.count(name)} times; keep one")
     return delimiter, header
+
+
+def _of_estimate(header: Sequence[str]) -> Sequence[str]:
+    """Give the columns that `impactcell estimate` writes, where all are there: no surprise to anybody."""
+    return ESTIMATED if set(ESTIMATED) - {SHOT} <= set(header) else ()
 
 
 def _column(name: str) -> str:

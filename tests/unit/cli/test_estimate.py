@@ -14,7 +14,8 @@ import pytest
 from impactcell.campaign import Campaign, Excitation, Sensor, write
 from impactcell.campaign import read as read_campaign
 from impactcell.cli.direction_note import note_of_direction
-from impactcell.cli.estimate import COLUMNS, estimate
+from impactcell.cli.estimate import estimate
+from impactcell.cli.estimate_columns import COLUMNS
 from impactcell.errors import CampaignError, NotConvergedError, PredictionError
 from impactcell.records import Capture, Channel
 from impactcell.web.texts.import_notes import page_note

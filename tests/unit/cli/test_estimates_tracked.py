@@ -9,6 +9,7 @@ import pytest
 import impactcell
 from impactcell import cell as core
 from impactcell.cli.estimate import estimate
+from impactcell.cli.estimate_columns import COLUMNS
 from impactcell.cli.track import track
 from impactcell.errors import SeriesError
 from impactcell.records import PositioningState
@@ -65,6 +66,23 @@ def test_an_error_of_all_cycles_is_in_what_is_told_of_the_level(
         off = abs(found["level"] - MU_S)
         held += off < 2.0 * np.hypot(found["level_std"], found["level_common_std"])
     assert held >= 17
+
+
+def test_columns_that_estimate_writes_are_no_surprise_to_track(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Fifteen of them were named on each run, between which a misspelled one is not seen."""
+    path = tmp_path / "s.csv"
+    lines = [",".join(COLUMNS)]
+    for shot in range(1, 31):
+        cells = dict.fromkeys(COLUMNS, "") | {"shot": f"{shot}", "mu_s": "0.2", "mu_s_std": "0.002"}
+        lines.append(",".join(cells[name] for name in COLUMNS))
+    path.write_text("\n".join(lines))
+    track(path)
+    assert capsys.readouterr().err == ""
+    path.write_text("\n".join(f"{line},charge" for line in lines))
+    track(path)
+    assert "not read: `charge`; what is read" in capsys.readouterr().err
 
 
 def test_what_all_cycles_share_is_said_where_it_is_known(
