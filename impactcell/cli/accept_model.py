@@ -1,22 +1,20 @@
 """`impactcell model accept`: an extended model into service, without losing what the cell has learned."""
 
 import json
-import math
 import shlex
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, Final
 
 from impactcell.cell import in_place_of
 from impactcell.cli.calibrate import calibrated_model
+from impactcell.cli.model_changes import model_changes
 from impactcell.cli.model_origin import ModelOrigin, origin_of, untold_sentence
 from impactcell.cli.own_taps import OwnTaps, compare_on_own_taps
 from impactcell.cli.paths import check_output
 from impactcell.cli.shared_model import cells_sharing, note_sharing
 from impactcell.errors import ImpactCellError, PredictionError, SettingsError
-from impactcell.physics.law_table import NOMINAL_PARAMETERS
 from impactcell.prediction import Model
 from impactcell.process.console import print_note, print_result
 from impactcell.process.whole_files import write_whole
@@ -57,7 +55,7 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
     for finding in judge_cell(read_cell(cell)):
         if finding.is_fault:
             print_note(str(finding))
-    origin = _origin_with_caution(model)
+    origin = origin_of(model)
     _tell(
         {
             "cell": cell_config.name,
@@ -73,14 +71,13 @@ def accept_model(cell: Path, extended: Path, *, anyway: bool = False, as_json: b
         + "".join(f"\n{one.sentence}" for one in (own_taps, origin) if one is not None),
         as_json=as_json,
     )
+    _note_caution(origin)
 
 
-def _origin_with_caution(model: Model) -> ModelOrigin | None:
-    """Give what was established as a model was found, and print the caution that goes with it."""
-    origin = origin_of(model)
+def _note_caution(origin: ModelOrigin | None) -> None:
+    """Print the caution that goes with what was established as a model was found."""
     if origin is not None and origin.caution:
-        print_note(origin.caution)
-    return origin
+        print_note(f"caution: {origin.caution}")
 
 
 def _judged(config: CellConfig, extended: Path, *, anyway: bool) -> tuple[Model, OwnTaps | None]:
@@ -217,15 +214,9 @@ def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json:
         _, own_taps = _judged(cell_config, extended, anyway=anyway)
     except ImpactCellError as error:
         refusal = error
-    changes = [
-        {"parameter": name, "before": old, "after": new, "ci95": _interval(after, name)}
-        for name, old, new in _changes(dict(_parameters(before)), dict(_parameters(after)))
-    ]
-    rows = [
-        f"  {c['parameter']}: {_text(c['before'])} -> {_text(c['after'])}{_interval_text(c['ci95'])}"
-        for c in changes
-    ]
-    origin = _origin_with_caution(after)
+    changes = model_changes(before, after)
+    rows = [f"  {change.sentence}" for change in changes]
+    origin = origin_of(after)
     rows += [one.sentence for one in (own_taps, origin) if one is not None]
     sharing = cells_sharing(cell_config)
     if sharing:
@@ -235,7 +226,7 @@ def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json:
             "cell": cell_config.name,
             "before": before.name,
             "after": after.name,
-            "changes": changes,
+            "changes": [asdict(change) for change in changes],
             "shared_with": list(sharing),
             "own_taps": None if own_taps is None else own_taps.content,
             "verdict": None if origin is None else origin.verdict,
@@ -245,6 +236,7 @@ def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json:
         "\n".join([f"{cell_config.name}: {before.name} -> {after.name}", *rows]),
         as_json=as_json,
     )
+    _note_caution(origin)
     if refusal is not None:
         raise refusal
 
@@ -252,41 +244,6 @@ def compare_models(cell: Path, extended: Path, *, anyway: bool = False, as_json:
 def previous_model(model_file: Path) -> Path:
     """Where the model is kept that the one in service has replaced."""
     return model_file.with_name(f"{model_file.stem}.previous{model_file.suffix}")
-
-
-def _parameters(model: Model) -> Iterator[tuple[str, float | list[float]]]:
-    for name in NOMINAL_PARAMETERS:
-        yield name, getattr(model.plant, name)
-    for effect, parameters in model.plant.effects.items():
-        for name, value in parameters.items():
-            yield f"{effect}.{name}", list(value) if isinstance(value, Sequence) else value
-
-
-def _changes(before: dict[str, Any], after: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:
-    for name in dict.fromkeys((*before, *after)):
-        old, new = before.get(name), after.get(name)
-        is_same = old == new or (
-            isinstance(old, float) and isinstance(new, float) and math.isclose(old, new, rel_tol=1e-9)
-        )
-        if not is_same:
-            yield name, old, new
-
-
-def _interval(model: Model, name: str) -> list[float] | None:
-    """Give the 95 % interval of a parameter, named after its effect; None where the model has none."""
-    effect, _, parameter = name.rpartition(".")
-    ends = model.intervals.get(effect, {}).get(parameter)
-    return None if ends is None else list(ends)
-
-
-def _interval_text(ends: Sequence[float] | None) -> str:
-    return "" if ends is None else f" (95 %: {_text(ends[0])} to {_text(ends[1])})"
-
-
-def _text(value: float | Sequence[float] | None) -> str:
-    if value is None:
-        return "none"
-    return f"{value:.6g}" if isinstance(value, float | int) else ", ".join(f"{v:.6g}" for v in value)
 
 
 def _tell(content: dict[str, Any], sentence: str, *, as_json: bool) -> None:

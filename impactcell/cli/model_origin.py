@@ -46,7 +46,10 @@ def origin_of(model: Model) -> ModelOrigin | None:
         parts.append(f"; held-out gap {gaps[0]} noise floors before, {gaps[1]} after")
     caution = CAUTIONS.get(verdict, "")
     if not caution and REMAINS in said:
-        caution = f"something remains that no established effect explains: {said[REMAINS]}"
+        caution = (
+            f"something remains that no established effect explains: {said[REMAINS]}; it may bend what this "
+            "model says of friction, and the report beside it shows where"
+        )
     return ModelOrigin(verdict, "".join(parts), caution)
 
 

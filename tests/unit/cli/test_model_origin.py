@@ -66,7 +66,8 @@ def test_the_verdict_is_said_and_a_caution_where_it_is_due(
     assert f"verdict of the investigation it comes from: {provenance['verdict']} (" in said.out
     assert "held-out gap 3.588 noise floors before, 1.02 after" in said.out
     if caution:
-        assert said.err.startswith("something remains" if REMAINS in provenance else caution)
+        begin = "something remains" if REMAINS in provenance else caution
+        assert said.err.startswith(f"caution: {begin}")
         assert caution in said.err
     else:
         assert said.err == ""
@@ -106,3 +107,19 @@ def test_a_contact_that_nothing_tells_is_refused_with_its_width_and_the_way_out(
     assert json.loads(capsys.readouterr().out)["refused"] == str(fault.value)
     accept(cell, file, "--anyway")
     assert read_cell(cell).model.prior == prior
+
+
+def test_how_well_a_contact_is_told_stands_beside_what_changes_in_it(
+    cell: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its stiffness alone stood there, as if it were known to all its digits."""
+    file = found(cell, {})
+    model = read_model(file)
+    plant = replace(model.plant, stiffness_n_per_m=7e5, damping_n_s_per_m=300.0)
+    prior = replace(model.prior, stiffness_std_n_per_m=1e4, damping_std_n_s_per_m=200.0)
+    write_model(replace(model, plant=plant, prior=prior), file)
+    accept(cell, file, "--dry-run", "--anyway", "--json")
+    changes = {c["parameter"]: c["ci95"] for c in json.loads(capsys.readouterr().out)["changes"]}
+    assert changes == {"stiffness_n_per_m": [6.8e5, 7.2e5], "damping_n_s_per_m": [0.0, 700.0]}
+    accept(cell, file, "--dry-run", "--anyway")
+    assert "\n  stiffness_n_per_m: 650000 -> 700000 (95 %: 680000 to 720000)\n" in capsys.readouterr().out
