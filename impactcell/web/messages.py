@@ -24,6 +24,7 @@ from impactcell.web.texts import CATALOGUE, LANGUAGES
 from impactcell.web.texts.import_faults import page_fault
 from impactcell.web.texts.import_notes import page_note
 from impactcell.web.texts.model_faults import model_fault
+from impactcell.web.texts.model_origins import model_caution
 from impactcell.web.texts.reasons import english_reason, german_reason
 
 LEAST_WHOLE = 9.95
@@ -172,6 +173,15 @@ class Messages:
         """Say why files cannot be read or a model is refused, after the language in which it is said."""
         refusal = model_fault(fault, self.language, self.model)
         return page_fault(fault, self.language) if refusal is None else (self.language, refusal)
+
+    def verdict(self, verdict: str | None) -> str:
+        """Say what an investigation established by its verdict; empty for one that is not known."""
+        key = f"verdict_{verdict}"
+        return self[key] if key in CATALOGUE else ""
+
+    def caution(self, caution: str) -> tuple[str, str]:
+        """Say why a model is to be taken with caution, after the language in which it is said."""
+        return model_caution(caution, self.language)
 
     def step(self, name: str) -> str:
         """Name a step of a study."""

@@ -18,6 +18,7 @@ from impactcell.web.studies.queue import PROGRAM_FAULT, is_choice
 from impactcell.web.studies.study import Acceptance, Goal, Stage, Study
 from impactcell.web.studies.two_values import differing_parameters
 from impactcell.web.studies.upload import KINDS, MAX_FILES, receive, safe_name
+from impactcell.web.texts.model_faults import is_untold
 
 _log: Final = logging.getLogger(__name__)
 
@@ -151,6 +152,7 @@ def _rendered(context: PageContext, request: Request, session: BrowserSession, t
         may_restore=may_accept and shown.can_be_restored and is_in_service,
         may_remove=_may_remove(shown, session),
         is_in_service=is_in_service,
+        is_untold=not shown.is_accepted and is_untold(shown.changes.get("refused") or ""),
         changed_since=changed_since,
         differing=differing_parameters(shown.result, shown.changes),
         report=REPORTS.get(_report_language(context, request, shown), ""),

@@ -4,6 +4,8 @@ import re
 from collections.abc import Callable
 from typing import Final
 
+from impactcell.german.findings import with_decimal_commas
+
 REFUSED: Final = re.compile(
     r"(?P<cell>.+?): model (?P<model>.+) is not put into service "
     r"\((?:--anyway|`(?P<command>[^`]+)`) would\): of the cell's last (?P<taps>\d+) taps it (?P<after>.+), "
@@ -33,9 +35,38 @@ UNTOLD_TEXTS: Final = {
     "Geschwindigkeiten aufzeichnen, auch langsame, die erst haften; oder das Gesetz, das der Bericht "
     "vorschlägt, als Effekt anbieten. Soll das Modell dennoch gelten: „{command}“.",
 }
+NOT_FREE: Final = re.compile(
+    r"no part of (?P<light>\S+)-(?P<heavy>\S+) kg slides free of the actuator between (?P<slow>\S+) and "
+    r"(?P<fast>\S+) mm/min(?:; tap faster, or with another stroke|: it catches up with the part; tap from "
+    r"about (?P<enough>\S+) mm/min on, or with a stroke of less than about (?P<stroke>\S+) mm)"
+)
+NOT_FREE_TEXTS: Final = {
+    "en": "With this model no part of {light} to {heavy} kg slides free of the actuator between {slow} and "
+    "{fast} mm/min, as this cell taps, and no tap could be estimated; it takes ",
+    "de": "Mit diesem Modell kommt kein Teil von {light} bis {heavy} kg zwischen {slow} und {fast} mm/min, "
+    "wie diese Zelle stößt, vom Antrieb frei, und kein Stoß ließe sich schätzen; es braucht ",
+}
+FREE_WITH: Final = {
+    "en": "taps from about {enough} mm/min on, or a stroke of less than about {stroke} mm.",
+    "de": "Stöße ab etwa {enough} mm/min oder einen Hub von weniger als etwa {stroke} mm.",
+}
+"""What would free the part, where that is known."""
+FREE_SOMEHOW: Final = {
+    "en": "faster taps, or another stroke.",
+    "de": "schnellere Stöße oder einen anderen Hub.",
+}
 ALL_NOISE: Final = ("leaves no more than the sensors' noise", "leaves 1 times the sensors' noise")
 """What a model leaves that follows all; the second is of stored studies."""
 LEAVES: Final = re.compile(r"leaves (?P<gap>\S+) times the sensors' noise")
+
+
+def is_untold(fault: str) -> bool:
+    """Whether a model was refused since its measurements do not tell its contact: no other day changes that.
+
+    >>> is_untold("p: the file is missing")
+    False
+    """
+    return UNTOLD.fullmatch(fault) is not None
 
 
 def model_fault(fault: str, language: str, named: Callable[[str], str] = str) -> str | None:
@@ -44,6 +75,8 @@ def model_fault(fault: str, language: str, named: Callable[[str], str] = str) ->
     >>> model_fault("p: the file is missing", "de") is None
     True
     """
+    if (held := NOT_FREE.fullmatch(fault)) is not None:
+        return _not_free(held.groupdict(), language)
     untold = UNTOLD.fullmatch(fault)
     match = untold or REFUSED.fullmatch(fault)
     if match is None:
@@ -60,10 +93,18 @@ def model_fault(fault: str, language: str, named: Callable[[str], str] = str) ->
     return TEXTS[language].format_map(said)
 
 
+def _not_free(said: dict[str, str | None], language: str) -> str:
+    """Say with which taps and masses no part slides free, and what would free it."""
+    free = (FREE_WITH if said["enough"] else FREE_SOMEHOW)[language]
+    figures = {name: figure or "" for name, figure in said.items()}
+    if language == "de":
+        figures = {name: with_decimal_commas(figure) for name, figure in figures.items()}
+    return f"{NOT_FREE_TEXTS[language]}{free}".format_map(figures)
+
+
 def _german_numbers(parameters: str) -> str:
     """Write the parameters of a contact with the decimal commas and units of German."""
-    commas = re.sub(r"(?<=\d)\.(?=\d)", ",", parameters.replace(", ", " und "))
-    return commas.replace("mu_k/mu_s", "µk/µs")
+    return with_decimal_commas(parameters.replace(", ", " und ")).replace("mu_k/mu_s", "µk/µs")
 
 
 def _german(phrase: str, subject: str) -> str:

@@ -74,6 +74,17 @@ STUDY_TEXTS: Texts = {
          "was bleibt. Dieses Modell hat keine; sein Wert nimmt einen Teil davon auf, und sein Bereich gilt "
          "neben einem Modellfehler von {level} Rauschpegeln nicht."),
     ),
+    "verdict": ("What the investigation says of it:", "Was die Untersuchung dazu sagt:"),
+    "verdict_no_gap": ("nothing is missing in it.", "Es fehlt ihm nichts."),
+    "verdict_named": ("what was missing is named.", "Was fehlte, ist benannt."),
+    "verdict_tied": (
+        "what was missing is named, but the data do not tell some of the names apart.",
+        "Was fehlte, ist benannt; manche der Namen unterscheiden diese Daten aber nicht.",
+    ),
+    "verdict_unknown": ("something is missing, and nothing was established.",
+                        "Etwas fehlt, und nichts ist nachgewiesen."),
+    "verdict_untested": ("nothing could be tested.", "Nichts war prüfbar."),
+    "caution": ("Caution:", "Vorsicht:"),
     "accept_help": (
         "The model is calibrated first. The cell takes it from the next cycle on: wear and alarms stay.",
         "Das Modell wird erst kalibriert. Die Zelle nimmt es ab dem nächsten Zyklus; Gelerntes bleibt.",
@@ -87,6 +98,12 @@ STUDY_TEXTS: Texts = {
         "It is not put into service as things are. Once that is put right, or new taps are there, ask again.",
         "So wird es nicht übernommen. Ist das behoben, oder gibt es neue Stöße, kann neu gefragt werden.",
     ),
+    "accept_untold": (
+        "Asking again changes nothing: other measurements are needed, dropped as these were.",
+        "Neu fragen ändert nichts: es braucht andere Messungen, abgelegt wie diese.",
+    ),
+    "no_model": ("Nothing was established, so there is no model to put into service.",
+                 "Nichts ist nachgewiesen, darum gibt es kein Modell zum Übernehmen."),
     "accept_again": ("Judge again; accept if nothing speaks against it",
                      "Neu beurteilen; annehmen, wenn nichts dagegen spricht"),
     "restore": ("Undo: put the model from before back", "Rückgängig: das vorige Modell wieder nehmen"),

@@ -8,6 +8,7 @@ import pytest
 
 import impactcell.web
 from impactcell.alarms import EventKind, Refusal
+from impactcell.cli.model_origin import VERDICTS
 from impactcell.german.findings import GERMAN_PHASES, GERMAN_STEPS
 from impactcell.physics.effect import Phase
 from impactcell.physics.effects import LIBRARY
@@ -50,7 +51,14 @@ def test_every_condition_role_theme_and_span_has_a_name() -> None:
 def test_no_text_is_left_over_or_missing() -> None:
     everything = sources("templates/*.j2", "*.py", "studies/*.py", "static/*.js")
     asked = set(re.findall(r't\["(\w+)"\]|t\[\'(\w+)\'\]', sources("templates/*.j2")))
-    assert {a or b for a, b in asked} <= set(CATALOGUE) | {"theme_", "span_", "stage_", "did_", "all_"}
+    assert {a or b for a, b in asked} <= set(CATALOGUE) | {
+        "theme_",
+        "span_",
+        "stage_",
+        "did_",
+        "all_",
+        "exposed_",
+    }
     scripts = sources("static/*.js")
     assert set(re.findall(r"texts\.(\w+)", scripts)) <= set(Messages("en").for_script())
     by_name = {
@@ -62,6 +70,8 @@ def test_no_text_is_left_over_or_missing() -> None:
         *(f"stage_{stage.value}" for stage in Stage),
         *(f"live_{freshness.value}" for freshness in Freshness),
         *(f"refused_{refusal.value}" for refusal in Refusal),
+        *(f"verdict_{verdict}" for verdict in VERDICTS),
+        *("exposed_users", "exposed_key", "exposed_read", "exposed_write", "exposed_read_write"),
         *("refused_BadInvalidArgument", "refused_BadOutOfRange", "refused_other"),
         *(
             "did_accept",

@@ -4,10 +4,14 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from impactcell.cli.model_origin import untold_sentence
 from impactcell.cli.own_taps import OwnTaps
+from impactcell.errors import PredictionError
+from impactcell.physics import TapInput
+from impactcell.prediction import calibrate
 from impactcell.settings.model_file import read_model
 from impactcell.web.messages import Messages
 
@@ -74,3 +78,20 @@ def test_a_model_whose_contact_nothing_tells_is_refused_in_either_language() -> 
     english = Messages("en").fault(fault)[1]
     assert "its measurements do not tell k " in english
     assert english.endswith(f"“{COMMAND}” takes it.")
+
+
+@pytest.mark.parametrize(
+    ("stroke_m", "way_out"),
+    [(0.0015, "es braucht schnellere Stöße oder"), (0.3, "es braucht Stöße ab etwa 40000 mm/min oder einen")],
+)
+def test_a_model_with_which_no_part_slides_free_is_refused_in_german(stroke_m: float, way_out: str) -> None:
+    """An effect that makes a contact soft: the German page told it in English."""
+    plant = replace(read_model(Path("config/models/prototype.yaml")).plant, stiffness_n_per_m=100.0)
+    tap = TapInput(velocity_m_s=0.1, mass_kg=20.0, stroke_m=stroke_m)
+    with pytest.raises(PredictionError) as refused:
+        calibrate(plant, tap, [9.45, 37.8], np.linspace(0.03, 0.1, 17), np.linspace(0.15, 0.25, 3))
+    language, german = Messages("de").fault(str(refused.value))
+    assert language == "de"
+    assert german.startswith("Mit diesem Modell kommt kein Teil von 9,45 bis 37,8 kg zwischen 1800 und 6000 ")
+    assert way_out in german
+    assert "With this model no part of 9.45 to 37.8 kg" in Messages("en").fault(str(refused.value))[1]
