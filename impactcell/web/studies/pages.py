@@ -37,7 +37,7 @@ REPORT_POLICY: Final = (
 async def studies(context: PageContext, request: Request, session: BrowserSession) -> Response:
     """List the studies, and offer to drop files."""
     queue = context.studies
-    listed = [(study, queue.place(study)) for study in queue.store]
+    listed = [(study, queue.place(study), queue.store.is_in_service(study)) for study in queue.store]
     return context.page(request, "studies.html.j2", session, studies=listed, kinds=",".join(sorted(KINDS)))
 
 
@@ -140,7 +140,7 @@ async def study_state(context: PageContext, request: Request, session: BrowserSe
 def _rendered(context: PageContext, request: Request, session: BrowserSession, template: str) -> Response:
     shown = _study(context, request)
     changed_since = context.studies.store.changed_since(shown)
-    is_in_service = shown.is_accepted and changed_since is None
+    is_in_service = context.studies.store.is_in_service(shown)
     may_accept = session.actor.role >= Role.ENGINEER
     return context.page(
         request,

@@ -168,6 +168,10 @@ class StudyStore:
         )
         return max(later, default=(0, "", None))[2]
 
+    def is_in_service(self, study: Study) -> bool:
+        """Whether its cell runs with its model, as far as studies have changed that."""
+        return study.is_accepted and self.changed_since(study) is None
+
     def find(self, study_id: str) -> Study | None:
         """Find one; None where there is none."""
         return self._studies.get(study_id)

@@ -31,6 +31,7 @@ STUDY_TEXTS: Texts = {
     "stage_unreadable": ("not readable yet", "noch nicht lesbar"),
     "stage_studying": ("is being studied", "wird untersucht"),
     "stage_done": ("done", "fertig"),
+    "in_service": ("its model is in service", "Modell in Betrieb"),
     "stage_failed": ("failed", "gescheitert"),
     "waits_behind": ("in the queue, place", "in der Warteschlange, Platz"),
     "against": ("Compared with the model of", "Verglichen mit dem Modell von"),

@@ -317,6 +317,7 @@ async def test_undoing_is_not_offered_where_another_model_came_since(page: Page)
             found.acceptances = [msgspec.structs.replace(found.acceptances[0], time_ms=now_ms)]
         shown = {code: (await client.get(f"/studies/{first}?lang={code}")).text for code in ("en", "de")}
         last = (await client.get(f"/studies/{second}")).text
+        listed = {code: (await client.get(f"/studies?lang={code}")).text for code in ("en", "de")}
         changed = list(page.backend.changed)
         assert (await client.post(f"/studies/{first}/restore", data=csrf)).status_code == 303
         assert page.backend.changed == changed
@@ -326,6 +327,9 @@ async def test_undoing_is_not_offered_where_another_model_came_since(page: Page)
     assert "hat eine andere Messung das Modell dieser Zelle geändert" in shown["de"]
     assert f'action="/studies/{second}/restore"' in last
     assert "another measurement" not in last
+    for language, said in (("en", "done, its model is in service"), ("de", "fertig, Modell in Betrieb")):
+        assert listed[language].count(said) == 1
+        assert listed[language].index(said) > listed[language].index(f"/studies/{second}")
 
 
 async def test_who_may_not_accept_or_remove_is_not_offered_it(page: Page) -> None:
