@@ -1,6 +1,7 @@
 """Every verb with its arguments and options, as the command lines themselves declare them."""
 
 import argparse
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -59,7 +60,12 @@ def _parameter(parameter: Any) -> tuple[str, str, str]:
         name = ", ".join(parameter.opts) + ("" if parameter.is_flag else f" {value}")
     default = parameter.default
     shown = "" if default is None or default is False or callable(default) else code(str(default))
-    return code(name), parameter.help or "", REQUIRED if parameter.required else shown
+    return code(name), _with_options(parameter.help or ""), REQUIRED if parameter.required else shown
+
+
+def _with_options(text: str) -> str:
+    """Write the options in a text as code: of plain ones the page makes dashes."""
+    return re.sub(r"(?<![`\w-])--[a-z][a-z-]*", lambda option: code(option[0]), text)
 
 
 def _simulator_verbs() -> Iterator[tuple[str, str, argparse.ArgumentParser]]:
@@ -79,4 +85,4 @@ def _actions(parser: argparse.ArgumentParser) -> list[argparse.Action]:
 def _action(action: argparse.Action) -> tuple[str, str, str]:
     value = "" if action.nargs == 0 else str(action.metavar or action.dest.upper())
     name = f"{', '.join(action.option_strings)} {value}".strip()
-    return code(name), action.help or "", REQUIRED if action.required else ""
+    return code(name), _with_options(action.help or ""), REQUIRED if action.required else ""

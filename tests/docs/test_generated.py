@@ -91,6 +91,8 @@ def test_every_verb_is_listed(pages: dict[str, str]) -> None:
     assert "| `--seed SEED` | Of the resampling. | `0` |" in pages["command_line.md"]
     assert "| `-o, --output DIR` | Where to write. | required |" in pages["command_line.md"]
     assert "[[" not in pages["command_line.md"]
+    assert "| With `--base`: shots or batches that fit. |" in pages["command_line.md"]
+    assert not re.search(r"--\w", re.sub(r"`[^`]*`", "", pages["command_line.md"])), "it is set as a dash"
 
 
 def test_the_simulator_and_the_exit_codes_are_listed(pages: dict[str, str]) -> None:
