@@ -15,6 +15,7 @@ from impactcell.errors import CaptureError, NotConvergedError, PhysicsError, Pre
 from impactcell.features import Features, extract, impulse_balance, noise_std
 from impactcell.numerics.stated_numbers import numbers, one_number
 from impactcell.physics import TapInput
+from impactcell.physics.local_friction import friction_factors
 from impactcell.prediction import Model, calibrate, estimate_from_features
 from impactcell.prediction.joint_plant_fit import estimate_mass, fit_plant
 from impactcell.process.console import print_note
@@ -235,8 +236,16 @@ def calibrated(model: Model, shots: Sequence[Capture]) -> Model:
         masses = np.geomspace(masses[0], masses[-1], VELOCITIES).tolist()
     fastest = max(shot.velocity_m_s for shot in usable)
     slowest = min(NARROWEST * fastest, *(shot.velocity_m_s for shot in usable))
-    frictions = np.linspace(1.0 - WIDEST, 1.0 + WIDEST, FRICTIONS) * model.plant.mu_s
-    tap = TapInput(fastest, masses[0], stroke, halts_at_separation=math.isinf(stroke))
+    tap = TapInput(
+        fastest,
+        masses[0],
+        stroke,
+        direction=usable[0].direction if len({shot.direction for shot in usable}) == 1 else 1,
+        halts_at_separation=math.isinf(stroke),
+        start_m=float(np.median([shot.start_m for shot in usable])),
+    )
+    mu_s = friction_factors(model.plant, tap).mu_s * model.plant.mu_s
+    frictions = np.linspace(1.0 - WIDEST, 1.0 + WIDEST, FRICTIONS) * mu_s
     velocities = np.linspace(slowest, fastest, VELOCITIES)
     with progress("calibrating", len(masses)) as advance:
         predictors = calibrate(

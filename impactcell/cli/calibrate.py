@@ -10,6 +10,7 @@ import numpy as np
 from impactcell.cli.paths import check_output
 from impactcell.errors import SettingsError
 from impactcell.physics import TapInput
+from impactcell.physics.local_friction import friction_factors
 from impactcell.prediction import Model
 from impactcell.prediction import calibrate as fit_predictors
 from impactcell.process.console import print_result
@@ -65,11 +66,12 @@ def calibrated_model(cell: CellConfig) -> Model:
     stroke = math.inf if settings.actuator.stroke_mm is None else settings.actuator.stroke_mm * 1e-3
     fastest = settings.actuator.max_velocity_mm_per_min / 60e3
     velocities = np.linspace(SLOWEST * fastest, fastest, VELOCITIES)
-    lowest = (1.0 - FRICTION_SPAN) * model.plant.mu_s
-    highest = max((1.0 + FRICTION_SPAN) * model.plant.mu_s, 1.04 * settings.alarms.wear_limit)
-    frictions = np.linspace(lowest, highest, FRICTIONS)
     masses = _masses(settings.part.mass_kg)
     tap = TapInput(fastest, float(masses[0]), stroke, halts_at_separation=math.isinf(stroke))
+    mu_s = friction_factors(model.plant, tap).mu_s * model.plant.mu_s
+    lowest = (1.0 - FRICTION_SPAN) * mu_s
+    highest = max((1.0 + FRICTION_SPAN) * mu_s, 1.04 * settings.alarms.wear_limit)
+    frictions = np.linspace(lowest, highest, FRICTIONS)
     with progress("calibrating", len(masses)) as advance:
         predictors = fit_predictors(
             model.plant, tap, masses.tolist(), velocities, frictions, lambda at, _: advance() if at else None

@@ -35,7 +35,7 @@ def depends_on_mass(identifier: str) -> bool:
     typical = np.array([*(one.typical for one in effect.parameters), *([1.0] * len(effect.columns))])
     masses = np.repeat([1.0, 2.0], 2)
     rows = np.array([[0.01, speed, mass, 9.81] for mass, speed in zip(masses, (0.1, -0.1) * 2, strict=True)])
-    per_kg = _evaluate(address(body), rows, typical) / masses
+    per_kg = values_of_law(address(body), rows, typical) / masses
     return not np.allclose(per_kg[:2], per_kg[2:], rtol=1e-9)
 
 
@@ -92,15 +92,15 @@ def acceleration(plant: Plant, tap: TapInput, speed_m_s: Samples) -> Samples:
         if body is not None:
             arguments[:, 0], arguments[:, 1] = tap.start_m, sign * speed_m_s
             arguments[:, 2], arguments[:, 3] = mass, g
-            total += sign * _evaluate(address(body), arguments, p) / mass
+            total += sign * values_of_law(address(body), arguments, p) / mass
         if kinetic is not None:
             arguments[:, 0], arguments[:, 1], arguments[:, 2:] = speed_m_s, tap.start_m, 0.0
-            total -= g * _evaluate(address(kinetic), arguments, p)
+            total -= g * values_of_law(address(kinetic), arguments, p)
     return total
 
 
 @compiled
-def _evaluate(law: int, arguments: FloatArray, parameters: FloatArray) -> FloatArray:
+def values_of_law(law: int, arguments: FloatArray, parameters: FloatArray) -> FloatArray:
     """Values of the law at an address, one for each row of four arguments."""
     values, pointer = np.empty(len(arguments)), float_pointer(parameters)
     for i in range(len(arguments)):

@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 
 from impactcell.errors import PhysicsError, PredictionError
 from impactcell.physics import Plant, TapEventKind, TapInput, simulate_tap
+from impactcell.physics.local_friction import friction_factors
 from impactcell.prediction.mass_interpolation import MassInterpolation
 from impactcell.prediction.model import (
     REFERENCE_VELOCITY,
@@ -186,6 +187,23 @@ def fit_predictor(plant: Plant, tap: TapInput, velocities: Samples, frictions: S
     return replace(fitted, force_sensitivity=Sensitivity(**force), distance_sensitivity=Sensitivity(**slide))
 
 
+def scaled(predictor: Predictor, scale: float) -> Predictor:
+    """Give the predictor of a mu_s that is `scale` times as large: both equations stay what they are."""
+    force, distance = predictor.force, predictor.distance
+    low, high = predictor.mu_s_range
+    return replace(
+        predictor,
+        mu_s_range=(low * scale, high * scale),
+        force=replace(force, friction_n=force.friction_n / scale, rms=force.rms * scale),
+        distance=replace(
+            distance,
+            limit=distance.limit * scale,
+            square_m=distance.square_m / scale**2,
+            rms=distance.rms * scale,
+        ),
+    )
+
+
 def calibrate(
     plant: Plant,
     tap: TapInput,
@@ -205,9 +223,11 @@ def calibrate(
     plant : Plant
         Its mu_k / mu_s is kept, mu_s is swept.
     tap : TapInput
-        Stroke, direction and halt of the cell; its velocity and mass are swept.
-    masses_kg, velocities_m_s, frictions : array_like
+        Stroke, direction, start and halt of the cell; its velocity and mass are swept.
+    masses_kg, velocities_m_s : array_like
         In ascending order.
+    frictions : array_like
+        Static friction where the tap begins, as the equations will give it; in ascending order.
     progress : callable, optional
         Called with the masses done and their number.
 
@@ -216,15 +236,17 @@ def calibrate(
     PredictionError
         The part slides free at too few velocities.
     """
+    scale = friction_factors(plant, tap).mu_s
+    of_plant = np.asarray(frictions, dtype=np.float64) / scale
     predictors = []
     grid = np.linspace(velocities_m_s[0], velocities_m_s[-1], REGIME_GRID)
     for index, mass in enumerate(masses_kg):
         if progress is not None:
             progress(index, len(masses_kg))
         tap_of_mass = replace(tap, mass_kg=float(mass))
-        for low, high in velocity_spans(regimes(plant, tap_of_mass, grid, frictions), grid):
+        for low, high in velocity_spans(regimes(plant, tap_of_mass, grid, of_plant), grid):
             within = np.linspace(low, high, len(velocities_m_s))
-            predictors.append(fit_predictor(plant, tap_of_mass, within, frictions))
+            predictors.append(scaled(fit_predictor(plant, tap_of_mass, within, of_plant), scale))
     if progress is not None:
         progress(len(masses_kg), len(masses_kg))
     if not predictors:

@@ -8,6 +8,7 @@ import numpy as np
 from impactcell.features import CheckedChannel, Features, required
 from impactcell.features.contact import contact_spells
 from impactcell.physics import Plant, TapEventKind, TapInput, simulate_tap
+from impactcell.physics.local_friction import FrictionFactors, friction_factors
 from impactcell.prediction.block_averaging import (
     FINE_FORCE_BLOCK_S,
     FINE_POSITION_BLOCK_S,
@@ -52,6 +53,11 @@ def tap_input(capture: Capture) -> TapInput:
         start_m=capture.start_m,
         dwell_s=capture.dwell_s,
     )
+
+
+def friction_factors_of(capture: Capture, plant: Plant) -> FrictionFactors:
+    """Give by what the friction of a plant is multiplied where the tap of a capture began."""
+    return friction_factors(plant, tap_input(capture))
 
 
 def halts_in_contact(capture: Capture, plant: Plant, theta: Samples) -> bool:

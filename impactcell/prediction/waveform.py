@@ -15,7 +15,7 @@ import numpy as np
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError
 from impactcell.features import Features, SlideFeatures, required
 from impactcell.features.contact import refuse_clipped
-from impactcell.prediction.capture_blocks import linearised_model, recorder_std_of, until_next_contact
+from impactcell.prediction import capture_blocks
 from impactcell.prediction.linearised_model import (
     LATEST_ONSET,
     MU_K,
@@ -63,7 +63,7 @@ class WaveformFit:
     Attributes
     ----------
     mu_s, mu_s_std, mu_k, mu_k_std : float
-        Posterior means and standard deviations.
+        Posterior means and standard deviations; of the plant, without factors of `physics.local_friction`.
     mu_s_common_std, mu_k_common_std : float
         The part of these that taps like this one share: errors of the plant's constants, of mass, velocity
         and scales as told; first contact is each tap's own.
@@ -109,10 +109,8 @@ def prior_of(model: Model, parameters: int = PARAMETERS) -> GaussianPrior:
             plant.damping_n_s_per_m / prior.damping_std_n_s_per_m,
         ]
     )
-    beyond = parameters - PARAMETERS
-    return GaussianPrior(
-        np.append(parameters_of(plant), np.zeros(beyond)), np.append(weight, np.ones(beyond))
-    )
+    told = np.ones(parameters - PARAMETERS)
+    return GaussianPrior(np.append(parameters_of(plant), 0.0 * told), np.append(weight, told))
 
 
 def fit(features: Features, model: Model) -> WaveformFit:
@@ -134,13 +132,14 @@ def fit(features: Features, model: Model) -> WaveformFit:
     """
     refuse_clipped(required(features.force))
     slide, capture = required(features.slide), features.capture
-    prior = prior_of(model, parameter_count(recorder_std_of(capture)))
+    prior = prior_of(model, parameter_count(capture_blocks.recorder_std_of(capture)))
     theta = prior.mean.copy()
     if not (capture.mass_kg > 0.0 and capture.velocity_m_s > 0.0):
         raise CaptureError("the part's mass or the actuator's velocity is not known")
     is_seen = slide.deceleration.is_seen
-    mu_k = deceleration_friction(model, capture.mass_kg, slide) if is_seen else model.plant.mu_k
-    theta[MU_K] = math.log(max(min(mu_k, _friction_overcome(features, model)), 1e-3))
+    here = capture_blocks.friction_factors_of(capture, model.plant).mu_k
+    mu_k = deceleration_friction(model, capture.mass_kg, slide) if is_seen else here * model.plant.mu_k
+    theta[MU_K] = math.log(max(min(mu_k, _friction_overcome(features, model)) / here, 1e-3))
     return _fitted(features, model, prior, theta)
 
 
@@ -173,16 +172,16 @@ def _fitted(features: Features, model: Model, prior: GaussianPrior, start: Sampl
 
 def _fit(features: Features, model: Model, prior: GaussianPrior, start: Samples) -> WaveformFit:
     plant = model.plant
-    response = linearised_model(features, with_parameters(plant, start))
-    if (before := until_next_contact(response, features)) is not response:
+    response = capture_blocks.linearised_model(features, with_parameters(plant, start))
+    if (before := capture_blocks.until_next_contact(response, features)) is not response:
         start = min(_fit_both_sides(before, prior, start), key=lambda minimum: minimum.cost).theta
-        response = linearised_model(features, with_parameters(plant, start))
+        response = capture_blocks.linearised_model(features, with_parameters(plant, start))
     kink_form = response.kink_form
     offset = response.kink_coordinate(start) - float(kink_form @ start)
     fits = _fit_both_sides(response, prior, start)
     plain, misfit = _likelier_side(fits, prior, (kink_form, offset))
     if misfit > MISFIT_THRESHOLD:  # perhaps only because the start had its kinks elsewhere
-        response = linearised_model(features, with_parameters(plant, plain.theta))
+        response = capture_blocks.linearised_model(features, with_parameters(plant, plain.theta))
         fits = _fit_both_sides(response, prior, plain.theta)
         plain, misfit = _likelier_side(fits, prior, (kink_form, offset))
     gap, told = response.gap(plain.residual), ""

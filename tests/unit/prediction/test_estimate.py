@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from impactcell.api.friction import calibrated
 from impactcell.features import extract
 from impactcell.physics import Plant, TapInput
 from impactcell.prediction import Model, Prior, calibrate, estimate, estimate_from_features
@@ -268,3 +269,55 @@ def test_many_outliers_are_no_accident() -> None:
     values[10:180:10] += 50.0
     found = estimate(replace(GOOD, force=replace(force(GOOD), values=values)), MODEL)
     assert found.mu_s.quality is not Quality.GOOD
+
+
+SLOPED = {"position_dependent_friction": {"gradient_per_m": 40.0}}
+WAVY = {"periodic_friction": {"amplitude": 0.2, "period_m": 0.02, "phase_rad": 0.5 * math.pi}}
+ROUGH = {"friction_patch": {"amplitude": 0.5, "position_m": 0.025, "width_m": 0.01}}
+LAME = {"direction_asymmetry": {"relative_amplitude": 0.1}}
+AGED = {"stiction_ageing": {"increase_per_decade": 0.1}}
+SLOW = {"stribeck_friction": {"friction_increase": 0.02, "stribeck_velocity_m_s": 0.02}}
+
+
+@pytest.mark.parametrize(
+    ("effects", "direction", "start_m", "factor"),
+    [
+        ({}, 1, 0.025, 1.0),
+        (VISCOUS, 1, 0.025, 1.0),
+        (SLOW, 1, 0.025, 1.0),
+        (SLOPED, 1, 0.025, 2.0),
+        (SLOPED, -1, 0.0125, 1.5),
+        (WAVY, 1, 0.02, 1.2),
+        (WAVY, 1, 0.01, 0.8),
+        (ROUGH, 1, 0.025, 1.5),
+        (LAME, 1, 0.0, 1.1),
+        (LAME, -1, 0.0, 0.9),
+    ],
+)
+def test_friction_is_that_of_the_place_where_the_tap_began(
+    effects: dict[str, dict[str, float]], direction: int, start_m: float, factor: float
+) -> None:
+    """By a gradient of 40/m a tap at 25 mm was told the friction of x = 0, half of what it met there."""
+    mu_s = 0.24 / factor
+    plant = Plant(6.5e5, 465.0, mu_s, 0.76 * mu_s, effects=effects)
+    tap = Tap(0.06, mu_s, direction=direction, start_m=start_m, stroke_m=1.5e-3, effects=effects)
+    model = calibrated(
+        Model("of the plant", plant, Prior(6500.0, 9.3, 0.0228)),
+        [tap.capture(), replace(tap, velocity_m_s=0.07).capture()],
+    )
+    found = estimate(tap.capture(np.random.default_rng(3)), model)
+    assert found.estimator is Estimator.WAVEFORM
+    assert found.mu_s.value == pytest.approx(0.24, rel=0.03)
+    assert found.mu_k.value == pytest.approx(0.76 * 0.24, rel=0.005)
+    assert found.by_force.value == pytest.approx(0.24, rel=0.04)
+    assert found.by_distance.value == pytest.approx(0.24, rel=0.04)
+
+
+def test_static_friction_is_that_after_the_rest_of_its_tap() -> None:
+    """Stiction that ages by a tenth a decade: after 100 s a part breaks loose at a fifth more."""
+    plant = Plant(6.5e5, 465.0, 0.2, 0.152, effects=AGED)
+    model = Model("of the plant", plant, Prior(6500.0, 9.3, 1e-3))
+    tap = Tap(0.04, 0.24, 0.152 / 0.24, effects={}).capture(np.random.default_rng(3))
+    rested = estimate(replace(tap, dwell_s=100.0), model)
+    assert rested.mu_s.value == pytest.approx(0.24, rel=0.01)
+    assert rested.mu_k.value == pytest.approx(0.152, rel=0.005)
