@@ -6,6 +6,7 @@ from impactcell.discrepancy.data.campaign_checks import (
     without_unlike_shots,
 )
 from impactcell.discrepancy.data.cell_limits import CellLimits
+from impactcell.discrepancy.data.coarse_raster import CoarseRaster, beside_rasters, coarse_rasters
 from impactcell.discrepancy.data.excitation import MIN_HELD_OUT, MIN_TRAINING, ExcitationStrategy
 from impactcell.discrepancy.data.free_slide import FreeSlide
 from impactcell.discrepancy.data.noise_floor import (
@@ -43,6 +44,7 @@ __all__ = [
     "PHASES",
     "POSITION",
     "CellLimits",
+    "CoarseRaster",
     "ExcitationStrategy",
     "FreeSlide",
     "IndexArray",
@@ -52,7 +54,9 @@ __all__ = [
     "ReplicateSpread",
     "ShotSet",
     "Trajectory",
+    "beside_rasters",
     "check_campaign_units",
+    "coarse_rasters",
     "concatenate_shots",
     "decimate",
     "notes_of_unlike",

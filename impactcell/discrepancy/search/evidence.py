@@ -5,10 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.discrepancy.data import PreparedCampaign
+from impactcell.discrepancy.data import (
+    CoarseRaster,
+    IndexArray,
+    PreparedCampaign,
+    beside_rasters,
+    coarse_rasters,
+)
 from impactcell.discrepancy.model import Fit, Problem, Scores, linearise, scores
 from impactcell.discrepancy.search import candidate_scores, residual_map
 from impactcell.discrepancy.search.wild_bootstrap import BootstrapTests, wild_bootstrap
+from impactcell.records import Samples
 
 ALPHA = 0.01
 """Family-wise error of one step: map and candidates each get half of it."""
@@ -75,10 +82,14 @@ def evaluate_on(problem: Problem, fit: Fit) -> Fit:
 
 
 def scan_candidates(
-    coarse: Problem, fit: Fit, library: Sequence[str], seed: tuple[int, ...]
+    coarse: Problem,
+    fit: Fit,
+    library: Sequence[str],
+    seed: tuple[int, ...],
+    rasters: Sequence[CoarseRaster | None] = (),
 ) -> CandidateScan:
-    """Score every candidate against a fitted model."""
-    coarse_fit = evaluate_on(coarse, fit)
+    """Score every candidate against a fitted model, beside what rounding to `rasters` makes of it."""
+    coarse_fit = _beside_rasters(coarse, evaluate_on(coarse, fit), rasters)
     linearisation = linearise(coarse, coarse_fit)
     directions = candidate_scores.candidate_directions(coarse, coarse_fit, linearisation, library)
     gains = scores(linearisation, directions.products)
@@ -86,7 +97,14 @@ def scan_candidates(
         fit,
         directions,
         gains,
-        wild_bootstrap(linearisation, gains, directions.group, (*seed, 2), directions.sign),
+        wild_bootstrap(
+            linearisation,
+            gains,
+            directions.group,
+            (*seed, 2),
+            directions.sign,
+            gains.information if any(rasters) else None,
+        ),
     )
 
 
@@ -105,11 +123,18 @@ def test_model(
         The shots with all samples, and with fewer of them.
     """
     problem, coarse = problems
-    linearisation = linearise(problem, fit)
+    rasters = coarse_rasters(problem.shots.items)
+    linearisation = linearise(problem, _beside_rasters(problem, fit, rasters))
     chart = residual_map.map_directions(problem, fit, linearisation, prepared)
     chart_scores = scores(linearisation, chart.products)
-    chart_tests = wild_bootstrap(linearisation, chart_scores, chart.cell, (*seed, 1))
-    scanned = scan_candidates(coarse, fit, library, seed)
+    chart_tests = wild_bootstrap(
+        linearisation,
+        chart_scores,
+        chart.cell,
+        (*seed, 1),
+        least=_noise_of_rounding(chart.channel, chart_scores.information, rasters),
+    )
+    scanned = scan_candidates(coarse, fit, library, seed, rasters)
     smallest = min(
         float(chart_tests.p_adjusted.min(initial=1.0)), float(scanned.tests.p_adjusted.min(initial=1.0))
     )
@@ -117,6 +142,22 @@ def test_model(
     if _relative_gain(chart_scores) > OVERWHELMING_GAIN:
         p_value = min(p_value, 1e-4)
     return ModelEvidence(fit, chart, chart_scores, chart_tests, scanned, p_value)
+
+
+def _beside_rasters(problem: Problem, fit: Fit, rasters: Sequence[CoarseRaster | None]) -> Fit:
+    """Return the same model with the residuals that it leaves beside what rounding makes."""
+    return replace(fit, residual=beside_rasters(problem.shots, fit.residual, rasters))
+
+
+def _noise_of_rounding(
+    channel: IndexArray, information: Samples, rasters: Sequence[CoarseRaster | None]
+) -> Samples:
+    """Variance that a score has by the noise floor, where samples are rounded, and else 0.
+
+    Samples that all shots have rounded alike scatter by nothing, and any trifle would be significant.
+    """
+    is_rounded = np.array([*(raster is not None for raster in rasters), False])
+    return np.where(is_rounded[channel], information, 0.0)
 
 
 def _relative_gain(map_scores: Scores) -> float:

@@ -45,6 +45,7 @@ def wild_bootstrap(
     groups: IndexArray,
     seed: tuple[int, ...],
     one_sided: Samples | None = None,
+    least: Samples | None = None,
     draws: int = DRAWS,
 ) -> BootstrapTests:
     """Test groups of directions.
@@ -55,6 +56,8 @@ def wild_bootstrap(
         Group of each direction, 0 to groups - 1.
     one_sided : ndarray, shape (Q,), optional
         +1 or -1 where only an amplitude of that sign makes sense, else 0.
+    least : ndarray, shape (Q,), optional
+        Least variance of a direction's score, where shots may be alike by more than chance.
     """
     n, Q = scores.each.shape
     count = int(groups.max()) + 1 if Q else 0
@@ -64,6 +67,7 @@ def wild_bootstrap(
     shifts = W @ linearisation.shot_gradient @ inverse
     shift_products = np.einsum("da,db->dab", shifts, shifts).reshape(draws, -1)
     sides = np.zeros(Q) if one_sided is None else one_sided
+    smallest = np.zeros(Q) if least is None else least
     statistics = np.zeros((draws + 1, count), order="F")
     for first in range(0, Q, DIRECTIONS_PER_BATCH):
         part = slice(first, min(first + DIRECTIONS_PER_BATCH, Q))
@@ -74,6 +78,7 @@ def wild_bootstrap(
             V[1:] -= 2.0 * shifts[:, a : a + 1] * (W @ (e * K[:, :, a]))
         of_shots = K.swapaxes(0, 1)
         V[1:] += shift_products @ (of_shots.swapaxes(1, 2) @ of_shots).reshape(e.shape[1], -1).T
+        V = np.maximum(V, smallest[part])
         safe = np.where(V > 1e-300, V, 1.0)
         T = np.where(V > 1e-300, U**2 / safe, 0.0)
         side = sides[part]
