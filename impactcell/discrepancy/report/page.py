@@ -227,11 +227,13 @@ def _regions(proof: Validation) -> dict[str, Any]:
 
 
 def _candidates(result: DiscrepancyResult, phrase: Callable[[str], str]) -> list[dict[str, Any]]:
-    """Evidence for every candidate against the nominal model."""
+    """Evidence for every candidate against the nominal model, and which of them cannot be seen."""
     evidence = result.selection.nominal
-    gains = evidence.candidate_scan.gains()
+    gains, seen = evidence.candidate_scan.gains(), evidence.candidate_scan.seen()
     rows: list[dict[str, Any]] = []
     for number, effect in enumerate(evidence.candidate_scan.candidates.names):
+        if effect not in seen:
+            continue
         rows.append(
             {
                 "name": phrase(effect),
@@ -242,11 +244,7 @@ def _candidates(result: DiscrepancyResult, phrase: Callable[[str], str]) -> list
                 "added": effect in result.added,
             }
         )
-    unseen = [
-        effect
-        for effect in LIBRARY
-        if effect not in evidence.candidate_scan.candidates.names and effect not in evidence.fit.effects
-    ]
+    unseen = [effect for effect in LIBRARY if effect not in seen and effect not in evidence.fit.effects]
     rows.sort(key=lambda row: (row["adjusted"], -row["gain"]))
     rows += [{"name": phrase(effect), "unseen": True} for effect in unseen]
     return rows

@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from impactcell.discrepancy.data import BETWEEN_SHOTS
@@ -79,7 +80,7 @@ def result_document(result: DiscrepancyResult) -> dict[str, Any]:
         "simulation": _simulation(result.simulation),
         **_law(result),
         "next_experiment": experiments(result.experiments),
-        "nominal": _parameters([estimate for estimate in result.stated_parameters if not estimate.effect]),
+        "nominal": _nominal([estimate for estimate in result.stated_parameters if not estimate.effect]),
         "noise_floor": {
             "noise_std": [round_digits(value) for value in result.floor.noise_std],
             "source": list(result.floor.source),
@@ -229,6 +230,18 @@ def _by_phase(evidence: ModelEvidence) -> dict[str, float]:
         ]
         gains[phase] = max(per_column)
     return gains
+
+
+def _nominal(parameter_estimates: list[ParameterEstimate]) -> dict[str, Any]:
+    """Write the plant's parameters; of `ratio`, mu_s/mu_k, the inverse too, as models and cells have it."""
+    inverse = [
+        replace(
+            one, parameter="mu_k_over_mu_s", value=1.0 / one.value, low=1.0 / one.high, high=1.0 / one.low
+        )
+        for one in parameter_estimates
+        if one.parameter == "ratio"
+    ]
+    return _parameters([*parameter_estimates, *inverse])
 
 
 def _parameters(parameter_estimates: list[ParameterEstimate]) -> dict[str, Any]:

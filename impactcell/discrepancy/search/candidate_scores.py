@@ -33,6 +33,8 @@ MAX_STRENGTH = 5.0
 """Strongest start of a fit, in units of an effect's typical strength."""
 WEAK_STRENGTH = 0.3
 """A second start of a fit, much weaker than the score promises, in the same units."""
+ALIKE_FACTORS = 1e-9
+"""Spread of the logarithms of shots' factors up to which an effect is the same in all of them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +89,8 @@ def candidate_directions(
         for point in grid:
             between = between_shot_factors(problem, identifier, point)
             if between is not None:
+                if float(np.ptp(between)) <= ALIKE_FACTORS:  # one factor of all shots: mu itself
+                    continue
                 parts.append(unit.modulate(-between / fit.spread))
             else:
                 change = effect_direction(problem, fit, identifier, point, is_single=len(grid) == 1)

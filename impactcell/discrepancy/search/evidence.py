@@ -45,6 +45,11 @@ class CandidateScan:
             gains[effect] = best[0][0] if best else 0.0
         return gains
 
+    def seen(self) -> tuple[str, ...]:
+        """Name the candidates of which these shots tell anything that the model could not take up."""
+        found = set(self.candidates.group[self.scores.information > 0.0].tolist())
+        return tuple(effect for number, effect in enumerate(self.candidates.names) if number in found)
+
     def p_value_of(self, effect: str) -> float:
         """Return the adjusted p-value of a candidate; 1 where it could not be tested."""
         if effect not in self.candidates.names:
