@@ -12,7 +12,11 @@ import pytest
 from impactcell.campaign import Excitation
 from impactcell.discrepancy.data import prepare
 from impactcell.discrepancy.data.noise_at_rest import noise_at_rest
-from impactcell.discrepancy.data.replicate_groups import replicate_groups, start_places
+from impactcell.discrepancy.data.replicate_groups import (
+    replicate_groups,
+    start_places,
+    velocity_settings,
+)
 from impactcell.records import Capture, Channel
 from tests.discrepancy.study import Job, quick_campaign
 
@@ -62,6 +66,39 @@ def test_a_start_that_was_measured_leaves_the_groups_as_they_are() -> None:
     assert [shot.group for shot in after.shots] == [shot.group for shot in before.shots]
     assert len({shot.group for shot in after.shots}) < len(after.shots)
     assert after.covariates == before.covariates
+
+
+def with_velocities(velocities_m_s: Sequence[float]) -> list[Capture]:
+    return [Capture(i, v, 10.0, None, PATH) for i, v in enumerate(velocities_m_s)]
+
+
+def test_velocities_that_were_measured_are_of_one_setting_up_to_two_per_cent() -> None:
+    """An actuator that scatters by half a per cent about four settings, nine taps of each."""
+    rng = np.random.default_rng(7)
+    nominal = np.repeat([0.04, 0.055, 0.07, 0.09], 9)
+    told = with_velocities(nominal.tolist())
+    measured = with_velocities((nominal * np.exp(0.003 * rng.normal(size=36))).tolist())
+    assert velocity_settings(measured) == velocity_settings(told) == [0] * 9 + [1] * 9 + [2] * 9 + [3] * 9
+    assert replicate_groups(measured, [0] * 36) == replicate_groups(told, [0] * 36)
+
+
+def test_velocities_that_were_told_are_compared_as_told() -> None:
+    assert velocity_settings(with_velocities([0.05, 0.0501] * 4)) == [0, 1] * 4
+    assert velocity_settings(with_velocities([math.nan] * 3)) == [0, 0, 0]
+    assert velocity_settings(with_velocities([0.05, math.nan, 0.05, 0.06])) == [1, 0, 1, 2]
+
+
+def test_a_velocity_that_was_measured_leaves_the_groups_as_they_are() -> None:
+    """Each shot was a setting of its own, so that gap (b) was null."""
+    told = quick_campaign(Job("single", (), 3, shots=24))
+    rng = np.random.default_rng(4)
+    measured = replace(
+        told,
+        shots=tuple(replace(s, velocity_m_s=s.velocity_m_s * (1 + 3e-3 * rng.normal())) for s in told.shots),
+    )
+    before, after = prepare(told), prepare(measured)
+    assert [shot.group for shot in after.shots] == [shot.group for shot in before.shots]
+    assert not any("No replicates" in note for note in after.notes)
 
 
 @pytest.mark.parametrize("flickering", [0, 3])

@@ -11,6 +11,13 @@ ALIKE_START = 0.01
 """Difference of two starts, over how far parts go in the median, up to which they are the same place [1]. A
 start that was measured is another number in each shot, and what friction does to it over a hundredth of a
 stroke is far below its scatter. Our choice."""
+ALIKE_VELOCITY = 0.02
+"""Relative difference of two velocities up to which they are the same setting [1]. A velocity that an
+actuator channel showed is another number in each tap: it scatters by up to 0.5 %, of which thirty taps span
+four times as much, and settings that somebody chose are 5 % apart and more. Our choice."""
+MEASURED_SHARE = 0.5
+"""Share of shots with a velocity of their own, to nine decimals, from which on velocities were measured [1]:
+those that were told come again. Our choice."""
 SAME = 9
 """Decimals in SI units to which what was told is compared."""
 
@@ -19,13 +26,33 @@ def start_places(captures: Sequence[Capture]) -> list[int]:
     """Give the number of the place at which each shot starts; starts are of one place up to `ALIKE_START`."""
     went = [float(np.ptp(shot.position.values)) for shot in captures if shot.position is not None]
     apart = max(ALIKE_START * float(np.median(went)) if went else 0.0, 10.0**-SAME)
-    places = [0] * len(captures)
-    place, first_m = -1, -math.inf
-    for number in sorted(range(len(captures)), key=lambda number: captures[number].start_m):
-        if not captures[number].start_m - first_m <= apart:
-            place, first_m = place + 1, captures[number].start_m
-        places[number] = place
-    return places
+    return _numbered([shot.start_m for shot in captures], apart)
+
+
+def velocity_settings(captures: Sequence[Capture]) -> list[int]:
+    """Give the number of each shot's velocity; of measured ones those up to `ALIKE_VELOCITY` are the same.
+
+    Velocities that were told come again: they are compared as they were told, also where they differ by less.
+    Those that are not known are one.
+    """
+    known = [math.log(shot.velocity_m_s) if shot.velocity_m_s > 0.0 else -math.inf for shot in captures]
+    told = {round(shot.velocity_m_s, SAME) for shot in captures if shot.velocity_m_s > 0.0}
+    are_measured = len(told) > MEASURED_SHARE * len(captures)
+    if are_measured:
+        return _numbered(known, math.log1p(ALIKE_VELOCITY))
+    values = [round(shot.velocity_m_s, SAME) if shot.velocity_m_s > 0.0 else -1.0 for shot in captures]
+    return _numbered(values, 0.0)
+
+
+def _numbered(values: Sequence[float], apart: float) -> list[int]:
+    """Give numbers to values in rising order: what lies no farther than `apart` above a first is one."""
+    numbers = [0] * len(values)
+    number, first = -1, -math.inf
+    for place in sorted(range(len(values)), key=values.__getitem__):
+        if number < 0 or (values[place] != first and not values[place] - first <= apart):
+            number, first = number + 1, values[place]
+        numbers[place] = number
+    return numbers
 
 
 def replicate_groups(captures: Sequence[Capture], places: Sequence[int]) -> list[int]:
@@ -35,15 +62,12 @@ def replicate_groups(captures: Sequence[Capture], places: Sequence[int]) -> list
     """
     groups: dict[tuple[float, ...], int] = {}
     return [
-        groups.setdefault((*_told(capture), place), len(groups))
-        for capture, place in zip(captures, places, strict=True)
+        groups.setdefault((velocity, *_told(capture), place), len(groups))
+        for capture, velocity, place in zip(captures, velocity_settings(captures), places, strict=True)
     ]
 
 
-def _told(capture: Capture) -> tuple[float, float, float]:
-    """Velocity, mass and direction as they were told; -1 of what was not."""
-    velocity, mass = (
-        round(value, SAME) if math.isfinite(value) else -1.0
-        for value in (capture.velocity_m_s, capture.mass_kg)
-    )
-    return velocity, mass, float(capture.direction)
+def _told(capture: Capture) -> tuple[float, float]:
+    """Mass and direction as they were told; -1 of a mass that was not."""
+    mass = round(capture.mass_kg, SAME) if math.isfinite(capture.mass_kg) else -1.0
+    return mass, float(capture.direction)

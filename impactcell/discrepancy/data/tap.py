@@ -19,6 +19,7 @@ from impactcell.discrepancy.data.prepared_shots import (
     PreparedShot,
     ShotSet,
 )
+from impactcell.discrepancy.data.replicate_groups import ALIKE_VELOCITY
 from impactcell.discrepancy.data.unit_checks import PlausibleRatio
 from impactcell.features.clipping import is_cut_off
 from impactcell.features.contact import MIN_CLIPPED_RUN
@@ -86,6 +87,7 @@ class Tap(ExcitationStrategy):
         """Channels, directions, velocities, masses and replicates that are not there."""
         masses = [shot.mass_kg for shot in shots if math.isfinite(shot.mass_kg)]
         unstated = len(shots) - len(masses)
+        velocities = [shot.velocity_m_s for shot in shots]
         lacks = (
             (
                 not _is_recorded(shots, FORCE),
@@ -101,7 +103,7 @@ class Tap(ExcitationStrategy):
                 "One direction only: tilt and asymmetry of direction cannot be seen.",
             ),
             (
-                len({round(shot.velocity_m_s, 9) for shot in shots}) < 2,
+                max(velocities) < (1.0 + ALIKE_VELOCITY) * min(velocities),
                 "One velocity only: terms that depend on speed are hard to tell apart.",
             ),
             (
