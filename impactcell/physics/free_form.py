@@ -30,8 +30,7 @@ class FreeForm:
     argument : str
         Python of the covariate in the same four numbers.
     constant_is : str
-        Parameter of the nominal plant that does what a constant function would; empty where none does, so
-        that a constant is a law of its own.
+        Parameter of the nominal plant that does what a constant function would; empty where none does.
     dissipates : str
         Parameter of the plant to which the function is added where the sum must not be negative, lest it give
         energy; `0` where it is the function alone, empty where either sign is possible.
@@ -76,6 +75,11 @@ class FreeForm:
     def covariates(self) -> tuple[str, ...]:
         """What the function is of."""
         return (self.covariate, self.second) if self.second else (self.covariate,)
+
+    @property
+    def has_constant(self) -> bool:
+        """Whether a constant is a law of its own: the plant's damper only pushes, one of a law pulls."""
+        return self.constant_is in {"", "damping_n_s_per_m"}
 
     @property
     def is_factor(self) -> bool:

@@ -77,6 +77,6 @@ def tangent(term: FreeTerm) -> Tangent:
     samples = term.fit.residual.size
     second = None if span.second is None else (span.second.lower, span.second.upper)
     return Tangent(
-        S, pull, span.lower, span.upper, samples, not form.constant_is, term.coefficients, others, response,
+        S, pull, span.lower, span.upper, samples, form.has_constant, term.coefficients, others, response,
         second,
     )  # fmt: skip
