@@ -195,11 +195,11 @@ def german_headline(result: Mapping[str, Any]) -> str:
                 said += f" {left}{_where(result)}."
     law = result.get("law")
     if law:
-        what = (
-            f"{german_effect(law['term'])} passt dazu, ist aber nicht benannt"
-            if law.get("term")
-            else "Ein Gesetz, das keine Bibliothek hat, passt dazu"
-        )
+        what = "Ein Gesetz, das keine Bibliothek hat, passt dazu"
+        if "a law beside those that were given" in result.get("headline", ""):
+            what = "Ein Gesetz neben den mitgegebenen passt dazu"
+        if law.get("term"):
+            what = f"{german_effect(law['term'])} passt dazu, ist aber nicht benannt"
         said += f" {what}: {german_equation(law['equation'])}."
     said += _follows(result.get("simulation"))
     return f"{said} (Abweichungen an zurückgehaltenen Messungen; 1 ist das Rauschen der Sensoren.)"

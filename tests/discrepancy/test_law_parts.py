@@ -1,5 +1,6 @@
 """Parts of the search for a law by themselves: covariates, their range, how a spline bends."""
 
+import math
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,7 +14,9 @@ from impactcell.discrepancy.laws.condense import RankedForm
 from impactcell.discrepancy.laws.grammar import Shaped
 from impactcell.discrepancy.laws.law import LawParameter, write_law
 from impactcell.discrepancy.model.parameters import effect_coordinates
-from impactcell.physics.effects import LIBRARY, withdraw_effect
+from impactcell.discrepancy.search.effect_grid import VisitedRange, effect_grid
+from impactcell.physics.effect import Effect, Kind, LawKind, Parameter, ParameterKind, Phase
+from impactcell.physics.effects import LIBRARY, offer_effect, withdraw_effect
 from impactcell.physics.free_forms import FREE_FORMS
 from impactcell.physics.outside_effects import offer_effects
 
@@ -163,3 +166,32 @@ def test_a_law_that_was_given_and_is_found_once_more_has_another_name(tmp_path: 
     finally:
         withdraw_effect(given.identifier)
     assert write_law(place, ranked, ((-0.01, 0.01),)).identifier == given.identifier
+
+
+def test_a_law_that_was_given_is_tried_as_it_was_given() -> None:
+    """Of a sum of two terms each was tried alone, at places on the table: it was found anew beside itself."""
+    given = Effect(
+        identifier="two_terms",
+        kind=Kind.CONTACT,
+        equation="d s(d)",
+        reference="a test",
+        phases=(Phase.LOADING,),
+        parameters=(
+            Parameter("amplitude_1_n_per_m", "N/m", null=0.0, lower=-1e8, upper=1e8, typical=-2.7e5),
+            Parameter("scale_m", "m", null=math.nan, lower=1e-6, upper=0.07, typical=5.8e-5),
+            Parameter("amplitude_2_n_per_m", "N/m", null=0.0, lower=-1e8, upper=1e8, typical=5.5e4),
+            Parameter("centre_m", "m", math.nan, 1e-6, 7e-4, 6.5e-5, kind=ParameterKind.POSITION),
+        ),
+        laws={LawKind.CONTACT: lambda a, _b, _c, _d, p: a * p[0] + p[2]},
+    )
+    offer_effect(given)
+    try:
+        grid = effect_grid("two_terms", 1, VisitedRange(0.0, 5e-3, 0.1))
+        coordinates = effect_coordinates("two_terms", 1)
+    finally:
+        withdraw_effect("two_terms")
+    whole = [point for point in grid if not point.scaled]
+    assert len(whole) == 1
+    values = [one.value(float(at)) for one, at in zip(coordinates, whole[0].theta, strict=True)]
+    assert values == pytest.approx([-2.7e5, 5.8e-5, 5.5e4, 6.5e-5])
+    assert all(point.scaled for point in effect_grid("friction_patch", 1, VisitedRange(0.0, 5e-3, 0.1)))

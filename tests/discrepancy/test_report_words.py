@@ -89,6 +89,7 @@ def proposed(functional_form: str, listed: str = "") -> Any:
         second="",
         covariates=("temperature_c",),
         is_between_shots=True,
+        law_kind=None,
         effect=SimpleNamespace(equation="mu (1 + s(temperature_c))"),
     )
     gap = SimpleNamespace(of=lambda _: 2.0)
@@ -104,11 +105,27 @@ def proposed(functional_form: str, listed: str = "") -> Any:
 
 @pytest.mark.parametrize(
     ("functional_form", "how"),
-    [("u", "in proportion to the temperature c"), ("log(1+u/l)", "as log(1+u/l) of u, the temperature c")],
+    [
+        ("u", "in proportion to the temperature c"),
+        ("1", "constant"),
+        ("log(1+u/l)", "as log(1+u/l) of u, the temperature c"),
+    ],
 )
 def test_a_law_is_told_as_one_would_say_it(functional_form: str, how: str) -> None:
     said = sentences._proposed(proposed(functional_form))
     assert said.startswith(f" With s in mu (1 + s(temperature_c)) {how}, a law that no library has, the fric")
+
+
+@pytest.mark.parametrize(("acts_between", "is_beside"), [(True, True), (False, False)])
+def test_a_law_that_may_be_one_of_those_given_is_not_said_to_be_in_no_library(
+    acts_between: bool, is_beside: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What `--effects` gave and the search did not take was proposed as a law "that no library has"."""
+    mine = SimpleNamespace(between=(lambda *_: None) if acts_between else None, laws={})
+    monkeypatch.setattr(sentences, "LIBRARY", {**sentences.LIBRARY, "mine": mine})
+    said = sentences._proposed(proposed("log(1+u/l)"))
+    assert ("a law beside those that were given" in said) is is_beside
+    assert ("a law that no library has" in said) is not is_beside
 
 
 def test_a_law_of_the_library_is_told_by_its_name() -> None:

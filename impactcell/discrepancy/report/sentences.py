@@ -10,8 +10,9 @@ from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import open_loop_sentence
 from impactcell.physics import Kind
 from impactcell.physics.effect_names import as_title, in_words
-from impactcell.physics.effects import find_effect
+from impactcell.physics.effects import LIBRARY, OF_PRODUCT, find_effect
 from impactcell.physics.free_column_forms import printed
+from impactcell.physics.free_form import FreeForm
 
 NOT_SET = frozenset({"direction", "order"})
 """Covariates of which there are no more values to set: a shot goes one way or the other, and has its turn."""
@@ -69,11 +70,21 @@ def _proposed(result: DiscrepancyResult) -> str:
     how = f"as a free-form function of {letters}, the {u}"
     if finding.proposed is not None:
         function = finding.proposed.functional_form
-        is_proportional = function == "u" and not form.second
-        how = f"in proportion to the {u}" if is_proportional else f"as {function} of {letters}, the {u}"
+        how = f"as {function} of {letters}, the {u}"
+        if not form.second:
+            how = {"u": f"in proportion to the {u}", "1": "constant"}.get(function, how)
         listed = finding.proposed.listed
-        how += f", {phrase(listed)}, which is not named" if listed else ", a law that no library has"
+        how += f", {phrase(listed)}, which is not named" if listed else f", a law {_beside_what(form)}"
     return f" With s in {form.effect.equation} {how}, the {fall}."
+
+
+def _beside_what(form: FreeForm) -> str:
+    """Say which laws a proposed one is not among: one that was given for its place may be the same."""
+    for name in set(LIBRARY) - OF_PRODUCT:
+        effect = LIBRARY[name]
+        if effect.between is not None if form.is_between_shots else form.law_kind in effect.laws:
+            return "beside those that were given"
+    return "that no library has"
 
 
 def noise_floor_sentence(result: DiscrepancyResult) -> str:

@@ -7,12 +7,14 @@ unit and from what the shots went through, so that a new effect needs no grid of
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from impactcell.discrepancy.model import Coordinate, effect_coordinates
 from impactcell.physics import ParameterKind
+from impactcell.physics.effects import OF_PRODUCT
 from impactcell.records import Samples
 
 SMALL_STRENGTH = 2e-3
@@ -102,7 +104,16 @@ def effect_grid(identifier: str, batches: int, visited: VisitedRange) -> tuple[G
             for i, value in zip(shapes, point, strict=True):
                 theta[i] = min(max(value, coordinates[i].lower), coordinates[i].upper)
             points.append(GridPoint(theta, strength, side, scaled=True))
+    if shapes and strengths and identifier not in OF_PRODUCT:
+        # Somebody knew this one: of a sum no term alone need be near, nor any point of a grid.
+        points.append(GridPoint(_typical(coordinates), strengths[0], 1, scaled=False))
     return tuple(points)
+
+
+def _typical(coordinates: Sequence[Coordinate]) -> Samples:
+    """Coordinates of an effect as its file has it: a law that was found has there what was found."""
+    given = [(one, one.definition.typical) for one in coordinates if one.definition is not None]
+    return np.array([min(max(one.coordinate(value), one.lower), one.upper) for one, value in given])
 
 
 def _is_strength(coordinate: Coordinate) -> bool:

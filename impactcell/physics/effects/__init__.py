@@ -30,6 +30,9 @@ LIBRARY: Mapping[str, Effect] = MappingProxyType(_OFFERED)
 """Every effect that is offered, by its identifier: those of the product, and what joined them from
 outside."""
 
+OF_PRODUCT = frozenset(_OFFERED)
+"""Identifiers of the effects of this package: no others are there before one joins from outside."""
+
 _ADDED: dict[str, Effect] = {}
 """Effects that joined while running: free-form terms and laws that nobody had listed."""
 
