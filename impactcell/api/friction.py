@@ -15,7 +15,7 @@ from impactcell.errors import CaptureError, NotConvergedError, PhysicsError, Pre
 from impactcell.features import Features, extract, impulse_balance, noise_std
 from impactcell.numerics.stated_numbers import numbers, one_number
 from impactcell.physics import TapInput
-from impactcell.physics.local_friction import friction_factors
+from impactcell.physics.local_friction import friction_factor
 from impactcell.prediction import Model, calibrate, estimate_from_features
 from impactcell.prediction.joint_plant_fit import estimate_mass, fit_plant
 from impactcell.process.console import print_note
@@ -244,7 +244,7 @@ def calibrated(model: Model, shots: Sequence[Capture]) -> Model:
         halts_at_separation=math.isinf(stroke),
         start_m=float(np.median([shot.start_m for shot in usable])),
     )
-    mu_s = friction_factors(model.plant, tap).mu_s * model.plant.mu_s
+    mu_s = friction_factor(model.plant, tap) * model.plant.mu_s
     frictions = np.linspace(1.0 - WIDEST, 1.0 + WIDEST, FRICTIONS) * mu_s
     velocities = np.linspace(slowest, fastest, VELOCITIES)
     with progress("calibrating", len(masses)) as advance:

@@ -10,7 +10,7 @@ import numpy as np
 from impactcell.cli.paths import check_output
 from impactcell.errors import SettingsError
 from impactcell.physics import TapInput
-from impactcell.physics.local_friction import friction_factors
+from impactcell.physics.local_friction import friction_factor
 from impactcell.prediction import Model
 from impactcell.prediction import calibrate as fit_predictors
 from impactcell.process.console import print_result
@@ -68,7 +68,7 @@ def calibrated_model(cell: CellConfig) -> Model:
     velocities = np.linspace(SLOWEST * fastest, fastest, VELOCITIES)
     masses = _masses(settings.part.mass_kg)
     tap = TapInput(fastest, float(masses[0]), stroke, halts_at_separation=math.isinf(stroke))
-    mu_s = friction_factors(model.plant, tap).mu_s * model.plant.mu_s
+    mu_s = friction_factor(model.plant, tap) * model.plant.mu_s
     lowest = (1.0 - FRICTION_SPAN) * mu_s
     highest = max((1.0 + FRICTION_SPAN) * mu_s, 1.04 * settings.alarms.wear_limit)
     frictions = np.linspace(lowest, highest, FRICTIONS)

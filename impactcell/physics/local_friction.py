@@ -1,6 +1,4 @@
-"""Friction of the place, the direction and the rest that one tap has: by what a plant's own is multiplied."""
-
-from dataclasses import dataclass, replace
+"""Friction of the place that a tap begins at: by what a plant's own is multiplied there."""
 
 import numpy as np
 
@@ -10,35 +8,25 @@ from impactcell.physics.law_table import build_law_table, parameter_vector, tap_
 from impactcell.physics.plant import Plant, TapInput
 
 
-@dataclass(frozen=True, slots=True)
-class FrictionFactors:
-    """By what a plant's mu_s and mu_k are multiplied where a tap begins.
+def friction_factor(plant: Plant, tap: TapInput) -> float:
+    """Evaluate a plant's effects on the friction of a place where a tap begins, before the part moves.
 
-    Attributes
-    ----------
-    mu_s, mu_k : float
-        1 without effects that make friction differ from tap to tap, or from place to place.
-    """
-
-    mu_s: float
-    mu_k: float
-
-
-def friction_factors(plant: Plant, tap: TapInput) -> FrictionFactors:
-    """Evaluate a plant's effects on friction where a tap begins, before the part moves.
-
-    f_s = b_s prod_i s_i(x_0), f_k = b_k prod_i s_i(x_0), with s the laws of `LawKind.SCALE` at the place
-    where the part lies, and b what acts between shots: direction, dwell, batch and order. What depends on
-    speed is added to mu_k in slip, and is no part of it.
+    prod_i s_i(x_0) of mu_s and mu_k, with s the laws of `LawKind.SCALE`; 1 without any. The plant's own are
+    those of x = 0 with most laws, where no tap may ever be. What acts between shots (direction, rest) is no
+    part of it: friction of taps both ways, or after other rests, is to be one that wear can be followed by.
+    What depends on speed is added to mu_k in slip.
     """
     if not plant.effects:
-        return FrictionFactors(1.0, 1.0)
+        return 1.0
     program = build_law_table(tuple(plant.effects))
-    values = parameter_vector(replace(plant, mu_s=1.0, mu_k=1.0), program)
+    first_law, end = int(program.laws[at.SCALE]), int(program.laws[at.SCALE + 1])
+    if first_law == end:
+        return 1.0
+    values = parameter_vector(plant, program)
     row = program.tap_parameters(values[None], plant.gravity_m_s2, tap_columns([tap]))[0]
     place = np.array([[tap.start_m, 0.0, 0.0, 0.0]])
-    scale = 1.0
-    for entry in range(program.laws[at.SCALE], program.laws[at.SCALE + 1], 2):
+    factor = 1.0
+    for entry in range(first_law, end, 2):
         law, first = int(program.laws[entry]), int(program.laws[entry + 1])
-        scale *= float(values_of_law(law, place, row[first:])[0])
-    return FrictionFactors(float(row[at.MU_S]) * scale, float(row[at.MU_K]) * scale)
+        factor *= float(values_of_law(law, place, row[first:])[0])
+    return factor

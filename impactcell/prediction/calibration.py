@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from impactcell.errors import PhysicsError, PredictionError
 from impactcell.physics import Plant, TapEventKind, TapInput, simulate_tap
-from impactcell.physics.local_friction import friction_factors
+from impactcell.physics.local_friction import friction_factor
 from impactcell.prediction.mass_interpolation import MassInterpolation
 from impactcell.prediction.model import (
     REFERENCE_VELOCITY,
@@ -236,7 +236,7 @@ def calibrate(
     PredictionError
         The part slides free at too few velocities.
     """
-    scale = friction_factors(plant, tap).mu_s
+    scale = friction_factor(plant, tap)
     of_plant = np.asarray(frictions, dtype=np.float64) / scale
     predictors = []
     grid = np.linspace(velocities_m_s[0], velocities_m_s[-1], REGIME_GRID)

@@ -8,7 +8,7 @@ import numpy as np
 from impactcell.features import CheckedChannel, Features, required
 from impactcell.features.contact import contact_spells
 from impactcell.physics import Plant, TapEventKind, TapInput, simulate_tap
-from impactcell.physics.local_friction import FrictionFactors, friction_factors
+from impactcell.physics.local_friction import friction_factor
 from impactcell.prediction.block_averaging import (
     FINE_FORCE_BLOCK_S,
     FINE_POSITION_BLOCK_S,
@@ -55,9 +55,9 @@ def tap_input(capture: Capture) -> TapInput:
     )
 
 
-def friction_factors_of(capture: Capture, plant: Plant) -> FrictionFactors:
+def friction_factor_of(capture: Capture, plant: Plant) -> float:
     """Give by what the friction of a plant is multiplied where the tap of a capture began."""
-    return friction_factors(plant, tap_input(capture))
+    return friction_factor(plant, tap_input(capture))
 
 
 def halts_in_contact(capture: Capture, plant: Plant, theta: Samples) -> bool:

@@ -13,7 +13,7 @@ from impactcell.features import (
     extract,
     impulse_balance,
 )
-from impactcell.prediction.capture_blocks import friction_factors_of, halts_in_contact, recorder_std_of
+from impactcell.prediction.capture_blocks import friction_factor_of, halts_in_contact, recorder_std_of
 from impactcell.prediction.equations import beyond_calibration, by_distance, by_force, combined, out_of_range
 from impactcell.prediction.linearised_model import FORCE_SCALE, MASS, PARAMETERS, POSITION_SCALE, VELOCITY
 from impactcell.prediction.mass_interpolation import interpolate_mass
@@ -52,8 +52,8 @@ def estimate_from_features(features: Features, model: Model, misfit: float = 1.0
     """Estimate mu_s and mu_k of one tap by equations (4), (5), (6) and by its waveform.
 
     Published is the waveform's estimate where it converges, else (6), else (4) or (5) alone where only one
-    channel was recorded. All are the friction that this tap met where it began: with the factors that the
-    model's effects have there, in its direction and after its rest (`physics.local_friction`).
+    channel was recorded. All are the friction of the place where the tap began, with the factor that the
+    model's effects have there (`physics.local_friction`).
     A capture that cannot be used, or contradicts itself, gives a bad estimate that says why; nothing is
     raised for it.
 
@@ -152,14 +152,11 @@ def _from_waveform(
 ) -> tuple[Coefficient, Coefficient, float]:
     """Coefficients as published, with a warning for a tap outside the calibration or unlike the model."""
     capture, mu_k_std = features.capture, waveform.mu_k_std
-    here = friction_factors_of(capture, model.plant)
+    here = friction_factor_of(capture, model.plant)
     if capture.position_scale_std and halts_in_contact(capture, model.plant, waveform.theta):
         # The place of the halt tells the position's scale no better than anybody knows the stroke.
         mu_k_std = max(mu_k_std, capture.position_scale_std * waveform.mu_k)
-    warnings = [
-        beyond_calibration(model, capture, here.mu_s * waveform.mu_s),
-        *_told_otherwise(capture, waveform),
-    ]
+    warnings = [beyond_calibration(model, capture, here * waveform.mu_s), *_told_otherwise(capture, waveform)]
     warnings.append(waveform.record_fault)
     if waveform.misfit > MISFIT_THRESHOLD:
         warnings.append(
@@ -169,13 +166,13 @@ def _from_waveform(
     reason = "mu_s through mu_k/mu_s of the model: the part moved at once" if at_once else ""
     own_variance = waveform.mu_k_std**2 - waveform.mu_k_common_std**2
     mu_k_common_std = math.sqrt(mu_k_std**2 - own_variance)
-    mu_s = _times(here.mu_s, waveform.mu_s, waveform.mu_s_std, waveform.mu_s_common_std, reason=reason)
-    mu_k = _times(here.mu_k, waveform.mu_k, mu_k_std, mu_k_common_std)
+    mu_s = _times(here, waveform.mu_s, waveform.mu_s_std, waveform.mu_s_common_std, reason=reason)
+    mu_k = _times(here, waveform.mu_k, mu_k_std, mu_k_common_std)
     return _with_warnings(mu_s, *warnings), _with_warnings(mu_k, *warnings), waveform.gap
 
 
 def _times(factor: float, value: float, std: float, common_std: float, reason: str = "") -> Coefficient:
-    """Friction where a tap began, of the model's that it was found with."""
+    """Return friction where a tap began, of that of the model that it was found with."""
     return Coefficient(factor * value, factor * std, Quality.GOOD, reason, factor * common_std)
 
 
@@ -289,8 +286,7 @@ def _mu_k(model: Model, slide: SlideFeatures | None, mu_s: Coefficient, capture:
     if slide is not None and (value := deceleration_friction(model, capture.mass_kg, slide)) > 0.0:
         return coefficient_of_slide(value, slide, capture, model.plant.gravity_m_s2)
     if mu_s.quality < Quality.BAD:
-        here = friction_factors_of(capture, model.plant)
-        ratio = model.ratio * here.mu_k / here.mu_s
-        std = ratio * math.hypot(mu_s.std, mu_s.value * model.prior.ratio_std / model.ratio)
+        ratio = model.ratio
+        std = ratio * math.hypot(mu_s.std, mu_s.value * model.prior.ratio_std / ratio)
         return Coefficient(ratio * mu_s.value, std, Quality.UNCERTAIN, "through mu_k/mu_s of the model")
     return Coefficient(reason=mu_s.reason)

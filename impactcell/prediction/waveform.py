@@ -63,7 +63,7 @@ class WaveformFit:
     Attributes
     ----------
     mu_s, mu_s_std, mu_k, mu_k_std : float
-        Posterior means and standard deviations; of the plant, without factors of `physics.local_friction`.
+        Posterior means and standard deviations; of the plant, without the factor of `physics.local_friction`.
     mu_s_common_std, mu_k_common_std : float
         The part of these that taps like this one share: errors of the plant's constants, of mass, velocity
         and scales as told; first contact is each tap's own.
@@ -137,7 +137,7 @@ def fit(features: Features, model: Model) -> WaveformFit:
     if not (capture.mass_kg > 0.0 and capture.velocity_m_s > 0.0):
         raise CaptureError("the part's mass or the actuator's velocity is not known")
     is_seen = slide.deceleration.is_seen
-    here = capture_blocks.friction_factors_of(capture, model.plant).mu_k
+    here = capture_blocks.friction_factor_of(capture, model.plant)
     mu_k = deceleration_friction(model, capture.mass_kg, slide) if is_seen else here * model.plant.mu_k
     theta[MU_K] = math.log(max(min(mu_k, _friction_overcome(features, model)) / here, 1e-3))
     return _fitted(features, model, prior, theta)
