@@ -103,7 +103,7 @@ class Tap(ExcitationStrategy):
                 "One direction only: tilt and asymmetry of direction cannot be seen.",
             ),
             (
-                max(velocities) < (1.0 + ALIKE_VELOCITY) * min(velocities),
+                max(velocities, default=0.0) <= (1.0 + ALIKE_VELOCITY) * min(velocities, default=0.0),
                 "One velocity only: terms that depend on speed are hard to tell apart.",
             ),
             (
