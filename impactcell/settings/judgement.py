@@ -15,6 +15,7 @@ from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.map_registers import unknown_names
 from impactcell.fieldbus.positioning_registers import not_placing
 from impactcell.journal.store import Journal
+from impactcell.physics.local_friction import goes_with_place
 from impactcell.prediction.mass_interpolation import velocity_range_m_s
 from impactcell.process import yaml_loader
 from impactcell.process.yaml_loader import FilePosition
@@ -116,7 +117,8 @@ def _of_model(cell: CellConfig) -> Iterator[Remark]:
                 f"the stroke is {stroke_mm:g} mm, model '{model.name}' was calibrated for {other_mm:g} mm; "
                 f"{calibrate}",
             )
-    if settings.alarms.wear_limit <= model.plant.mu_s:
+    # Of a plant whose friction goes with the place mu_s is that of x = 0, where no tap may be.
+    if settings.alarms.wear_limit <= model.plant.mu_s and not goes_with_place(model.plant):
         yield Remark(
             ("alarms", "wear_limit"),
             f"the wear limit {settings.alarms.wear_limit:g} is not above the friction of the model itself "

@@ -128,3 +128,19 @@ def test_a_part_that_the_integrator_does_not_move_is_told_to_be_too_heavy(
     findings = judged(tmp_path, {"mass_kg": f"{mass_kg:.6g}"}, {})
     assert [f.is_fault for f in findings if "no tap moves the part" in f.message] == [True] * still
     assert still is (heavier > 1.0)
+
+
+@pytest.mark.parametrize(
+    ("effect", "is_refused"),
+    [
+        ("surface_tilt: {tilt_rad: 0.001}", True),
+        ("position_dependent_friction: {gradient_per_m: -10.0}", False),
+    ],
+)
+def test_a_limit_is_not_compared_with_the_friction_of_a_place_where_no_tap_is(
+    tmp_path: Path, effect: str, is_refused: bool
+) -> None:
+    """mu_s of a model whose friction goes with the place is that of x = 0."""
+    found = judged(tmp_path, {}, {"mu_s": "0.26", "viscous_coefficient_n_s_per_m": f"85.0\n    {effect}"})
+    told = [finding for finding in found if "not above the friction of the model itself" in finding.message]
+    assert bool(told) == is_refused
