@@ -9,7 +9,7 @@ import numpy as np
 from impactcell.api.friction import with_masses
 from impactcell.campaign import Campaign, Excitation, from_contact
 from impactcell.errors import CampaignError, PhysicsError, PredictionError
-from impactcell.features import Features, extract, impulse_balance
+from impactcell.features import Features, extract, impulse_balance, with_noise_at_rest
 from impactcell.prediction.contact_onset import fit_plant_and_onset, is_late, onset_sentence
 from impactcell.prediction.plant_fit import PlantFit
 from impactcell.process.console import print_note
@@ -76,7 +76,10 @@ def fit_first_model(campaign: Campaign, name: str, source: str) -> FirstModel:
     struck, notes = from_contact(campaign)
     for note in notes:
         print_note(note)
-    taps = with_masses([extract(shot) for shot in struck.shots])
+    shots, told = with_noise_at_rest(campaign.shots, struck.shots)
+    for note in told:
+        print_note(note)
+    taps = with_masses([extract(shot) for shot in shots])
     doubt = _common_doubt(taps)
     try:
         fit, used = fit_plant_and_onset(_with_one_contact(taps), struck.gravity_m_s2, name)

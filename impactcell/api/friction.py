@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from impactcell.api.stated_tap import a_path, check_ascending, check_fastest
 from impactcell.campaign.pretrigger import is_late, late_onset
 from impactcell.errors import CaptureError, NotConvergedError, PhysicsError, PredictionError, SettingsError
-from impactcell.features import Features, extract, impulse_balance, noise_std
+from impactcell.features import Features, extract, impulse_balance, noise_std, with_noise_at_rest
 from impactcell.numerics.stated_numbers import numbers, one_number
 from impactcell.physics import TapInput
 from impactcell.physics.local_friction import friction_factor
@@ -120,10 +120,12 @@ def estimate(
         cycle=1,
         velocity_m_s=velocity,
         mass_kg=mass,
-        force=_channel(time, force),
-        position=_channel(time, position),
+        force=Channel(time, force),
+        position=Channel(time, position),
         stroke_m=stroke,
     )
+    (capture,), _ = with_noise_at_rest([capture], [capture])
+    capture = replace(capture, force=_with_noise(capture.force), position=_with_noise(capture.position))
     features = extract(as_recorded(capture))
     _check_signs_and_start(features)
     if model_file is not None:
@@ -192,10 +194,13 @@ def _samples(name: str, given: ArrayLike) -> Samples:
     return np.where(np.isfinite(values), values, math.nan)
 
 
-def _channel(time_s: Samples, values: Samples) -> Channel:
+def _with_noise(channel: Channel | None) -> Channel | None:
     """Give the channel its own noise, or the least that a sensor has."""
-    channel = Channel(time_s, values)
-    least = LEAST_NOISE * float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+    if channel is None:
+        return None
+    least = LEAST_NOISE * float(
+        np.max(np.abs(channel.values), initial=0.0, where=np.isfinite(channel.values))
+    )
     return replace(channel, noise_std=max(noise_std(channel), least))
 
 

@@ -23,7 +23,7 @@ from impactcell.discrepancy.data import (
     without_unlike_shots,
 )
 from impactcell.errors import CampaignError, PredictionError
-from impactcell.features import Features, extract
+from impactcell.features import Features, extract, with_noise_at_rest
 from impactcell.prediction import Model, estimate_from_features
 from impactcell.prediction.contact_onset import fit_plant_and_onset, is_late, onset_sentence
 from impactcell.prediction.slide_friction import friction_of_slide
@@ -65,7 +65,8 @@ def estimate(
     """
     if output is not None:
         check_output(output, CampaignError)
-    campaign_data, notes = from_contact(read(campaign))
+    recorded = read(campaign)
+    campaign_data, notes = from_contact(recorded)
     with naming(campaign):
         refuse_rotation(campaign_data)
     for note in notes:
@@ -85,7 +86,10 @@ def estimate(
     if campaign_data.excitation is Excitation.FREE_SLIDE:
         rows = estimate_free_slides(campaign_data, cell)
     else:
-        taps = with_masses([extract(shot) for shot in campaign_data.shots])
+        shots, told = with_noise_at_rest(recorded.shots, campaign_data.shots)
+        for note in told:
+            print_note(note)
+        taps = with_masses([extract(shot) for shot in shots])
         rows = _of_taps(campaign_data, taps, cell)
     if note := note_of_direction(campaign_data, {number: row.mu_k.value for number, row in rows}):
         print_note(note)

@@ -42,6 +42,18 @@ class CheckedChannel(Channel):
     highest: float = math.nan
     plateau: int = 0
 
+    def mean_std(self, count: int) -> float:
+        """Give the standard deviation of the mean of so many samples, of which neighbours may share noise."""
+        white = self.sigma / math.sqrt(count)
+        if self.shared_noise is None:
+            return white
+        return max(white, min(self.shared_noise.mean_std(count), self.sigma))
+
+    def halves_std(self, count: int) -> float:
+        """Give that of the difference of the means of the two halves of so many samples."""
+        white = self.sigma * math.sqrt(4.0 / count)
+        return white if self.shared_noise is None else max(white, self.shared_noise.difference_std(count))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CheckedForce(CheckedChannel):
@@ -91,7 +103,8 @@ def check_channel(channel: Channel | None, name: str) -> CheckedChannel:
         raise CaptureError(f"the {name} is constant at {channel.values[0]:.6g}")
     return CheckedChannel(
         channel.time_s, channel.values, channel.noise_std, channel.full_scale, channel.resolution,
-        zero_std=channel.zero_std, sigma=noise_std(channel), highest=highest, plateau=plateau,
+        zero_std=channel.zero_std, shared_noise=channel.shared_noise, sigma=noise_std(channel),
+        highest=highest, plateau=plateau,
     )  # fmt: skip
 
 
@@ -167,7 +180,8 @@ def check_force(channel: Channel | None) -> CheckedForce:
     smooth = force.values if width == 1 else running_mean(force.values, width)
     return CheckedForce(
         force.time_s, force.values, force.noise_std, force.full_scale, force.resolution,
-        sigma=force.sigma, highest=force.highest, plateau=force.plateau, smooth=smooth,
+        zero_std=force.zero_std, shared_noise=force.shared_noise, sigma=force.sigma,
+        highest=force.highest, plateau=force.plateau, smooth=smooth,
     )  # fmt: skip
 
 

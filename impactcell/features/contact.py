@@ -66,7 +66,9 @@ def peak_force(force: CheckedForce) -> MeasuredFeature:
     if peak is None:  # a jump beside the peak, as when the actuator halts within the contact
         sided = [_fit_maximum(times, values, sigma, times[top], *s) for s in ((1.0, 0.0), (0.0, 1.0))]
         peak = max((fit for fit in sided if fit is not None), key=lambda fit: fit.value, default=None)
-    return peak or MeasuredFeature(float(smooth[top]), sigma)
+    if peak is None:
+        return MeasuredFeature(float(smooth[top]), sigma)
+    return MeasuredFeature(peak.value, math.hypot(peak.std, _shared_std(force, 2.0 * MIN_WINDOW_S)))
 
 
 def refuse_clipped(force: CheckedForce) -> None:
@@ -115,7 +117,7 @@ def loss_of_contact(force: CheckedForce) -> MeasuredFeature:
         if real and squares / sigma**2 < freedom + 4.0 * math.sqrt(2.0 * freedom):
             root = min(real, key=abs)
             slope = abs(float(parabola[1] + 2.0 * parabola[2] * root))
-            error = unsure * value_std(factor, root)
+            error = math.hypot(unsure * value_std(factor, root), _shared_std(force, window))
             return MeasuredFeature(end_s + window * root, window * min(error / max(slope, 1e-300), 1.0))
         window /= FLANK_SHRINK
     near = times[max(0, last - 50) : last + 2]
@@ -138,11 +140,18 @@ def contact_spells(force: CheckedForce) -> list[tuple[float, float]]:
 def _contact_threshold(force: CheckedForce, width: int, highest: float) -> tuple[float, float]:
     """Smoothed force above which there is contact, and how unsure a sample of it is, N."""
     sigma, smooth = force.sigma, force.smooth
-    threshold = max(THRESHOLD_STD * sigma / math.sqrt(width), THRESHOLD_SHARE * highest)
+    threshold = max(THRESHOLD_STD * force.mean_std(width), THRESHOLD_SHARE * highest)
     idle = float(np.abs(smooth[-max(len(smooth) // IDLE_PART, 1) :]).max())
     if threshold < idle < MAX_IDLE_SHARE * highest:
         return IDLE_FACTOR * idle, sigma + idle
     return threshold, sigma
+
+
+def _shared_std(force: CheckedForce, window_s: float) -> float:
+    """Give the standard deviation of what the samples of a window have in common, N; 0 of white noise."""
+    if force.shared_noise is None:
+        return 0.0
+    return force.mean_std(max(round(window_s / force.shared_noise.step_s), 1))
 
 
 def _real_roots(c0: float, c1: float, c2: float) -> tuple[float, ...]:

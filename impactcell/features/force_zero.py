@@ -25,14 +25,15 @@ def with_zero(force: CheckedForce) -> tuple[CheckedForce, str]:
     """
     before = int(np.searchsorted(force.time_s, 0.0, "left"))
     tail = force.values[-max(len(force.values) // IDLE_PART, 1) :]
-    levels = [_level(idle, force.sigma) for idle in (force.values[: max(before - 1, 0)], tail)]
+    levels = [_level(idle, force) for idle in (force.values[: max(before - 1, 0)], tail)]
     if levels[1] is None or (before > FEWEST and levels[0] is None):
         return force, ""
     (after, count), (first, earlier) = levels[1], levels[0] or (0.0, 0)
-    if earlier and abs(first - after) > FLAT_STD * force.sigma * math.sqrt(1.0 / earlier + 1.0 / count):
+    after_std, first_std = force.mean_std(count), force.mean_std(earlier) if earlier else 0.0
+    if earlier and abs(first - after) > FLAT_STD * math.hypot(first_std, after_std):
         return force, ""
     offset = (after * count + first * earlier) / (count + earlier)
-    std = force.sigma / math.sqrt(count + earlier)
+    std = math.hypot(after_std * count, first_std * earlier) / (count + earlier)
     is_small = abs(offset) < MAX_IDLE_SHARE * float(force.smooth.max())
     if not (abs(offset) > OFFSET_STD * std and (is_small or earlier)):
         return force, ""
@@ -48,12 +49,12 @@ def with_zero(force: CheckedForce) -> tuple[CheckedForce, str]:
     return taken_off, f"force stands at {offset:.3g} N without contact, taken off: tare its sensor"
 
 
-def _level(values: Samples, sigma: float) -> tuple[float, int] | None:
+def _level(values: Samples, force: CheckedForce) -> tuple[float, int] | None:
     """Mean and number of samples that are noise about one value; None where they are not, or too few."""
     count, half = len(values), len(values) // 2
     if count < FEWEST:
         return None
     apart = abs(mean(values[:half]) - mean(values[half:]))
-    if apart > FLAT_STD * sigma * math.sqrt(4.0 / count) or float(values.std()) > MAX_SCATTER * sigma:
+    if apart > FLAT_STD * force.halves_std(count) or float(values.std()) > MAX_SCATTER * force.sigma:
         return None
     return mean(values), count

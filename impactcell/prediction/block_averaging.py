@@ -14,7 +14,8 @@ import numpy as np
 
 from impactcell.features import CheckedChannel
 from impactcell.numerics.jit import compiled
-from impactcell.records import Samples
+from impactcell.prediction.whitening import within_block_std
+from impactcell.records import CorrelatedNoise, Samples
 
 FORCE_BLOCK_S, FINE_FORCE_BLOCK_S = 1e-4, 1e-5
 """Longest block of force, s, and about an event: there its bend costs less than the noise (see above)."""
@@ -61,12 +62,15 @@ class BlockMeans:
         Mean time, mean value, and its standard deviation from the noise of one sample.
     scatter : WithinBlockSums
         What the means leave out.
+    noise : CorrelatedNoise or None
+        What neighbouring samples share of their noise; `std` is then that of samples within a block alone.
     """
 
     time_s: Samples
     values: Samples
     std: Samples
     scatter: WithinBlockSums
+    noise: CorrelatedNoise | None = None
 
 
 def average_blocks(
@@ -96,10 +100,11 @@ def average_blocks(
         if high > low:
             rulers.append(_ruler(low, high + fine_s, fine_s))
     rulers += [(edge, 0.0, 1.0) for edge in edges]
-    sigma = channel.sigma
+    noise = channel.shared_noise
+    sigma = channel.sigma if noise is None else within_block_std(noise, coarse_s)
     table = _average(times, values, np.array(rulers), sigma)
     return BlockMeans(
-        table[1], table[2], table[6], WithinBlockSums(table[0], table[3], table[4], table[5], sigma)
+        table[1], table[2], table[6], WithinBlockSums(table[0], table[3], table[4], table[5], sigma), noise
     )
 
 

@@ -17,6 +17,7 @@ from impactcell.errors import PhysicsError
 from impactcell.physics import Ensemble, Plant, TapInput
 from impactcell.prediction.block_averaging import BlockMeans
 from impactcell.prediction.block_residuals import Linearisation, add_bends, linearise_blocks, sample_squares
+from impactcell.prediction.whitened_blocks import WhitenedBlocks
 from impactcell.records import Samples
 
 MU_K, RATIO, STIFFNESS, DAMPING, ONSET, MASS, VELOCITY, FORCE_SCALE, POSITION_SCALE = range(9)
@@ -105,8 +106,10 @@ class LinearisedModel:
         self.kink_form = kink_form[: self.parameters]
         self.force_time_s, self.position_time_s = force.time_s, position.time_s
         self.size = len(force.values) + len(position.values)
-        self._values = np.concatenate([force.values, position.values])
-        self._weights = 1.0 / np.concatenate([force.std, position.std])
+        self._block_weights = 1.0 / np.concatenate([force.std, position.std])
+        self._whitened = WhitenedBlocks(force, position)
+        self._values = self._whitened.innovations(np.concatenate([force.values, position.values]))
+        self._weights = 1.0 / self._whitened.std
         self._weight_n = tap.mass_kg * plant.gravity_m_s2
         copies = min(self.parameters + 1, FORCE_SCALE + 1)
         self._ensemble = Ensemble(
@@ -120,13 +123,14 @@ class LinearisedModel:
         self._spreads = force.scatter.spread, position.scatter.spread
         is_force = np.arange(self.size) < len(force.values)
         zeros = np.array([is_force * zero_std[0], ~is_force * zero_std[1]])
-        self._disturbances = zeros[np.array(zero_std) > 0.0]
+        self._disturbances = self._whitened.innovations(zeros[np.array(zero_std) > 0.0])
         self._table = np.tile(self._ensemble.parameters(plant), (copies, 1))
 
     def reweighted(self, factor: Samples) -> "LinearisedModel":
         """Give the same blocks and model with the standard deviation of each block multiplied, shape (n,)."""
         other = copy(self)
         other._weights = self._weights / factor  # noqa: SLF001  # its own copy
+        other._block_weights = self._block_weights / factor  # noqa: SLF001
         return other
 
     def disturbed_by(self, shape: Samples) -> "LinearisedModel":
@@ -135,6 +139,7 @@ class LinearisedModel:
         `shape`, (n,), is what one standard deviation of it adds to the blocks, in N and m.
         """
         other = copy(self)
+        shape = self._whitened.innovations(shape)
         other._disturbances = np.vstack([self._disturbances, shape])  # noqa: SLF001  # its own copy
         return other
 
@@ -144,7 +149,7 @@ class LinearisedModel:
         With U its weighted shapes and S = U U' + 1 what is left of residuals r is r' = r - U' S^-1 U r, so
         that U r' = S^-1 U r: the sizes that were eliminated.
         """
-        return float((shape * self._weights) @ residual)
+        return float((self._whitened.innovations(shape) * self._weights) @ residual)
 
     def with_effects_of(self, plant: Plant) -> "LinearisedModel":
         """Give the same blocks and what a plant with other effects makes of them."""
@@ -166,12 +171,12 @@ class LinearisedModel:
         ndarray, shape (d,); ndarray, shape (d, p); ndarray, shape (d, d)
             All of what is left once the disturbances that are in the fit have been eliminated.
         """
-        shapes = left = shapes * self._weights
+        shapes = left = self._whitened.innovations(shapes) * self._weights
         if len(self._disturbances):
             known = self._disturbances * self._weights
             left = shapes - shapes @ known.T @ np.linalg.solve(known @ known.T + np.eye(len(known)), known)
         split, copies = len(self.force_time_s), self.parameters + 1
-        force, position = fitted.traces
+        force, position = self._whitened.of_traces(*fitted.traces)
         scaled = left * self._weights
         with_traces = scaled[:, :split] @ force.reshape(copies, split).T
         with_traces += scaled[:, split:] @ position.reshape(copies, self.size - split).T
@@ -180,7 +185,7 @@ class LinearisedModel:
 
     def modelled(self, residual: Samples) -> tuple[Samples, Samples]:
         """Give the blocks of force [N] and position [m] that leave a residual."""
-        model = self._values - residual / self._weights
+        model = self._whitened.restored(self._values - residual / self._weights)
         return model[: len(self.force_time_s)], model[len(self.force_time_s) :]
 
     def curves(self, fitted: Linearisation) -> tuple[Samples, Samples]:
@@ -204,7 +209,7 @@ class LinearisedModel:
             if len(times) > 2:
                 sums = scatter.count, scatter.times, scatter.values, scatter.both, scatter.noise_std
                 squares, counted = sample_squares(
-                    times, model[part], residual[part], self._weights[part], sums
+                    times, model[part], residual[part], self._block_weights[part], sums
                 )
                 total += squares
                 count += counted
@@ -242,8 +247,9 @@ class LinearisedModel:
         force, position = self._traces(theta, side)
         disturbances = self._disturbances * self._weights
         fields = linearise_blocks(
-            force, position, self._values, self._weights, steps, (RATIO, beyond), disturbances
-        )
+            *self._whitened.of_traces(force, position), self._values, self._weights, steps,
+            (RATIO, beyond), disturbances,
+        )  # fmt: skip
         if not math.isfinite(fields[3]):
             raise PhysicsError("the motion is not finite with these parameters")
         return Linearisation(*fields, traces=(force, position))

@@ -21,6 +21,7 @@ from impactcell.records.capture import (
     uniform_times,
     with_open_onset,
 )
+from impactcell.records.correlated_noise import CorrelatedNoise, SharedPart
 from impactcell.records.friction import (
     BatchState,
     Coefficient,
@@ -49,6 +50,7 @@ __all__ = [
     "Capture",
     "Channel",
     "Coefficient",
+    "CorrelatedNoise",
     "CycleId",
     "Estimator",
     "Evidence",
@@ -57,6 +59,7 @@ __all__ = [
     "PositioningState",
     "Quality",
     "Samples",
+    "SharedPart",
     "Shelving",
     "Signature",
     "Snapshot",

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from impactcell.records.correlated_noise import CorrelatedNoise
+
 Samples = NDArray[np.float64]
 
 FIRST_CONTACT_S = 1e-9
@@ -49,6 +51,8 @@ class Channel:
         Standard deviation of that speed's white noise; None where it is not known.
     zero_std : float
         Standard deviation of its zero, where that was taken from the record; 0 where it is as recorded.
+    shared_noise : CorrelatedNoise or None
+        Of which neighbouring samples share a part, where that showed at rest; `noise_std` is of all.
     """
 
     time_s: Samples
@@ -59,6 +63,7 @@ class Channel:
     summed_up: bool = False
     speed_noise_std: float | None = None
     zero_std: float = 0.0
+    shared_noise: CorrelatedNoise | None = None
 
 
 def since_contact(time_s: Samples) -> slice:

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from impactcell.campaign import Campaign, Excitation
+from impactcell.campaign import Campaign
 from impactcell.discrepancy.data import driven_blocks, measured_drive, prepare, prepared_campaign
 from impactcell.discrepancy.data.measured_drive import SmoothedDrive, position_response, smooth_drive
-from impactcell.discrepancy.data.noise_at_rest import NoiseAtRest, noise_at_rest, std_of_pieces
 from impactcell.discrepancy.data.noise_floor import sensor_noise
 from impactcell.discrepancy.data.prepared_shots import MOTION_COVARIATES
 from impactcell.discrepancy.data.tap import Tap
@@ -20,6 +19,7 @@ from impactcell.discrepancy.data.unit_checks import PlausibleRatio, check_units
 from impactcell.discrepancy.laws.law import COVARIATE_WORDS
 from impactcell.discrepancy.report import german_sentences
 from impactcell.errors import CampaignError
+from impactcell.features.noise_at_rest import NoiseAtRest, noise_at_rest, std_of_pieces
 from impactcell.records import Capture, Channel
 from impactcell.web.texts.import_notes import page_note
 from tests.discrepancy.study import Job, campaign, name_effects, quick_campaign
@@ -130,9 +130,8 @@ def test_noise_before_contact_that_is_more_than_neighbours_show_is_taken(
         whole, kept = (SimpleNamespace(values=part, noise_std=stated) for part in (values, values[200:]))
         recorded.append(SimpleNamespace(force=None, position=whole, actuator=None))
         counted.append(SimpleNamespace(force=None, position=kept, actuator=None))
-    whole_campaign = SimpleNamespace(shots=recorded, excitation=Excitation.TAP)
-    campaigns: Any = (whole_campaign, SimpleNamespace(shots=counted))
-    found = noise_at_rest(*campaigns)
+    taps: Any = (recorded, counted)
+    found = noise_at_rest(*taps)
     assert set(found) == ({"position"} if correlation > 0.0 and stated is None else set())
     for one in found.values():
         assert one.std == pytest.approx(1.5e-6, rel=0.05)
@@ -160,9 +159,8 @@ def test_noise_after_the_tap_tells_where_nothing_was_recorded_before_it(
         values += 4e-3 * (1.0 - np.clip(1.0 - np.arange(1000) / last, 0.0, None) ** 2)
         channel = SimpleNamespace(values=values, noise_std=None)
         shots.append(SimpleNamespace(force=None, position=channel, actuator=None))
-    excitation = Excitation.DRIVEN if noise == "driven" else Excitation.TAP
-    campaign: Any = SimpleNamespace(shots=shots, excitation=excitation)
-    found = noise_at_rest(campaign, campaign)
+    taps: Any = shots
+    found = noise_at_rest(taps, taps, rest_after=noise != "driven")
     assert set(found) == ({"position"} if told else set())
     for one in found.values():
         assert one.std == pytest.approx(1e-6 * (told or 0.0), rel=0.06)

@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from impactcell.campaign import Excitation
 from impactcell.discrepancy.data import prepare
-from impactcell.discrepancy.data.noise_at_rest import noise_at_rest
 from impactcell.discrepancy.data.replicate_groups import (
     replicate_groups,
     start_places,
     velocity_settings,
 )
+from impactcell.features import noise_at_rest
 from impactcell.records import Capture, Channel
 from tests.discrepancy.study import Job, quick_campaign
 
@@ -112,8 +111,5 @@ def test_an_encoder_that_stands_still_shows_no_noise(flickering: int) -> None:
         kept = Channel(np.arange(300.0), moves, None)
         recorded.append(SimpleNamespace(force=None, position=whole, actuator=None))
         counted.append(SimpleNamespace(force=None, position=kept, actuator=None))
-    campaigns: Any = (
-        SimpleNamespace(shots=recorded, excitation=Excitation.TAP),
-        SimpleNamespace(shots=counted),
-    )
-    assert noise_at_rest(*campaigns) == {}
+    taps: Any = (recorded, counted)
+    assert noise_at_rest(*taps) == {}

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from impactcell.discrepancy.data.noise_at_rest import NoiseAtRest
 from impactcell.discrepancy.data.prepared_campaign import PreparedCampaign
 from impactcell.discrepancy.data.prepared_shots import CHANNELS, IndexArray, PreparedShot
 from impactcell.errors import CampaignError
-from impactcell.features import white_noise_std
+from impactcell.features import NoiseAtRest, white_noise_std
+from impactcell.features.noise_at_rest import TOLD_IN
 from impactcell.records import Samples
 
 NOISE_UNIT_FACTOR = 30.0
@@ -22,8 +22,6 @@ MIN_REPLICATE_SPREAD = 1e-9
 """Smallest spread of replicates, so that equal factors divide nothing by zero."""
 DOUBTED_FACTOR = 1.5
 """Ratio of estimated and stated noise beyond which what is stated is doubted, and told."""
-TOLD_IN = ((1.0, "N", "noise_std_n"), (1e6, "µm", "noise_std_m"), (1e6, "µm", "noise_std_m"))
-"""What the noise of each channel is told in: how many of a unit are one of SI, the unit, its key in YAML."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +89,8 @@ def sensor_noise(prepared: PreparedCampaign) -> NoiseFloor:
 
 def _doubted(channel: int, stated: float, estimate: float) -> str:
     """Say that samples scatter by more than the noise that is stated of them."""
-    name, (scale, unit, key) = CHANNELS[channel], TOLD_IN[channel]
+    name = CHANNELS[channel]
+    scale, unit, key = TOLD_IN[name]
     return (
         f"The noise of {name} is stated as {scale * stated:.3g} {unit}, and neighbouring samples scatter by "
         f"{scale * estimate:.3g} {unit}: gaps are told in what is stated, and so are too large; "
@@ -101,14 +100,13 @@ def _doubted(channel: int, stated: float, estimate: float) -> str:
 
 def _of_samples(channel: int, std: float, resting: NoiseAtRest | None) -> str:
     """Say where the noise of a channel comes from that is not stated."""
-    name, (scale, unit, key) = CHANNELS[channel], TOLD_IN[channel]
-    said = f"The noise of {name} is not stated; {scale * std:.3g} {unit} was estimated from "
-    if resting is None:
-        return said + "neighbouring samples, which is a lower bound where noise is correlated."
-    return said + (
-        f"samples at rest {resting.where}, {resting.ratio:.3g} times what neighbouring samples show: it is "
-        f"correlated or has outliers. What moves at rest counts as noise: state {key} of sensors: {name} in "
-        "campaign.yaml if it is known."
+    name = CHANNELS[channel]
+    if resting is not None:
+        return resting.told(name)
+    scale, unit, _ = TOLD_IN[name]
+    return (
+        f"The noise of {name} is not stated; {scale * std:.3g} {unit} was estimated from neighbouring "
+        "samples, which is a lower bound where noise is correlated."
     )
 
 

@@ -19,7 +19,6 @@ from impactcell.discrepancy.data.campaign_checks import (
 )
 from impactcell.discrepancy.data.clipped_samples import without_clipped_samples
 from impactcell.discrepancy.data.excitation import ExcitationStrategy
-from impactcell.discrepancy.data.noise_at_rest import NoiseAtRest, noise_at_rest
 from impactcell.discrepancy.data.prepared_shots import (
     MOTION_COVARIATES,
     OWN_COVARIATES,
@@ -33,7 +32,7 @@ from impactcell.discrepancy.data.replicate_groups import replicate_groups, start
 from impactcell.discrepancy.data.shot_making import STRATEGIES, prepared_shot
 from impactcell.discrepancy.data.shots_unlike import notes_of_unlike
 from impactcell.errors import CampaignError
-from impactcell.features import noise_std
+from impactcell.features import NoiseAtRest, noise_at_rest, noise_std
 from impactcell.quality import inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Channel
 
@@ -137,7 +136,7 @@ def prepare(campaign: Campaign) -> PreparedCampaign:
             _stated_noise(campaign.shots, "position"),
             _stated_noise(campaign.shots, "actuator"),
         ),
-        noise_at_rest(whole, campaign),
+        noise_at_rest(whole.shots, campaign.shots, rest_after=whole.excitation is Excitation.TAP),
         tuple(notes),
     )
 

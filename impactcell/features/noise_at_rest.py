@@ -1,16 +1,25 @@
 """What samples at rest say of the noise: all of it, where neighbouring ones show a part."""
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from impactcell.campaign import Campaign, Excitation
-from impactcell.discrepancy.data.prepared_shots import CHANNELS
-from impactcell.features import white_noise_std
-from impactcell.records import Samples
+from impactcell.features.noise import white_noise_std
+from impactcell.features.noise_kernel import correlated_noise
+from impactcell.records import Capture, Channel, CorrelatedNoise, Samples
 
+CHANNELS = ("force", "position", "actuator")
+"""Channels that are looked at."""
+ESTIMATED_FROM = ("force", "position")
+"""Channels that friction is estimated from."""
+TOLD_IN = {
+    "force": (1.0, "N", "noise_std_n"),
+    "position": (1e6, "µm", "noise_std_m"),
+    "actuator": (1e6, "µm", "noise_std_m"),
+}
+"""What the noise of each channel is told in: how many of a unit are one of SI, the unit, its key in YAML."""
 MOVES_BEFORE_CONTACT = "actuator"
 """Channel that has no one value then; after its stroke it has."""
 LAST_SAMPLES = 3
@@ -31,6 +40,9 @@ MIN_EXCESS, CERTAIN_EXCESS = 0.05, 4.0
 """Excess of the scatter at rest over that of neighbouring samples from which on it counts: at least, and by
 the root of the samples. White noise exceeded it in 1 to 2 % of 300 draws (4 to 60 shots of 40 samples, 24 of
 300), and then it is as good an estimate."""
+MAX_BEYOND_STATED = 0.1
+"""Excess of the scatter at rest over a noise that is stated up to which this is that of all of it. Our
+choice: a sensor's noise is known to some per cent."""
 BISECTIONS = 50
 """Halvings of the interval in which the correlation of neighbouring samples lies."""
 
@@ -53,23 +65,37 @@ class NoiseAtRest:
     ratio: float
     where: str
 
+    def told(self, name: str) -> str:
+        """Say where the noise of a channel comes from that is not stated."""
+        scale, unit, key = TOLD_IN[name]
+        return (
+            f"The noise of {name} is not stated; {scale * self.std:.3g} {unit} was estimated from samples at "
+            f"rest {self.where}, {self.ratio:.3g} times what neighbouring samples show: it is correlated or "
+            f"has outliers. What moves at rest counts as noise: state {key} of sensors: {name} in "
+            "campaign.yaml if it is known."
+        )
 
-def noise_at_rest(recorded: Campaign, counted: Campaign) -> Mapping[str, NoiseAtRest]:
+
+def noise_at_rest(
+    recorded: Sequence[Capture], counted: Sequence[Capture], *, rest_after: bool = True
+) -> Mapping[str, NoiseAtRest]:
     """Find channels whose noise is not stated, and correlated or with outliers: more than neighbours show.
 
     Taps rest before contact, and where they were not recorded there after they have slid.
 
     Parameters
     ----------
-    recorded, counted : Campaign
-        Of taps with the samples before contact, and what `from_contact` makes of it.
+    recorded, counted : sequence of Capture
+        Of taps with the samples before contact, and what `from_contact` makes of them.
+    rest_after : bool
+        Whether the part lies still at the end of a record, as after a tap.
     """
     found = {}
     for channel in CHANNELS:
         where, resting = "before contact", list(_before_contact(recorded, counted, channel))
-        if not resting and recorded.excitation is Excitation.TAP:
+        if not resting and rest_after:
             where, resting = "after the tap", list(_after_the_tap(counted, channel))
-        if len(resting) < MIN_SHARE * len(counted.shots):
+        if len(resting) < MIN_SHARE * len(counted):
             continue
         if not np.median([np.ptp(values) for values in resting]) > 0.0:
             continue  # an encoder that stands still shows no noise
@@ -79,6 +105,80 @@ def noise_at_rest(recorded: Campaign, counted: Campaign) -> Mapping[str, NoiseAt
         if std > (1.0 + excess) * white > 0.0:
             found[channel] = NoiseAtRest(std, std / white, where)
     return found
+
+
+def with_noise_at_rest(
+    recorded: Sequence[Capture], counted: Sequence[Capture]
+) -> tuple[tuple[Capture, ...], tuple[str, ...]]:
+    """Give taps the noise that they show at rest, where it is more than neighbouring samples show.
+
+    What neighbours share of it is looked for in all rest, before contact and after the slide. A standard
+    deviation that is stated holds; what neighbours share is no matter of it, unless rest shows more than it.
+
+    Parameters
+    ----------
+    recorded, counted : sequence of Capture
+        As for `noise_at_rest`; of `recorded` those that are counted.
+
+    Returns
+    -------
+    taps : tuple of Capture
+    notes : tuple of str
+    """
+    numbers = {tap.cycle for tap in counted}
+    recorded = [_unstated(tap) for tap in recorded if tap.cycle in numbers]
+    unstated = [_unstated(tap) for tap in counted]
+    shown, taps, notes = noise_at_rest(recorded, unstated), tuple(counted), []
+    for name in ESTIMATED_FROM:
+        if name not in shown:
+            continue
+        stated = next((one.noise_std for tap in counted if (one := getattr(tap, name)) is not None), None)
+        if stated is None:
+            notes.append(shown[name].told(name))
+        elif shown[name].std > (1.0 + MAX_BEYOND_STATED) * stated:
+            continue
+        shared = _shared(recorded, unstated, name)
+        taps = tuple(
+            _told(tap, before, name, shown[name].std, shared)
+            for tap, before in zip(taps, recorded, strict=True)
+        )
+    return taps, tuple(notes)
+
+
+def _unstated(tap: Capture) -> Capture:
+    """Take no noise of a tap as stated."""
+    force, position = (
+        channel if channel is None or channel.noise_std is None else replace(channel, noise_std=None)
+        for channel in (tap.force, tap.position)
+    )
+    return replace(tap, force=force, position=position)
+
+
+def _shared(recorded: Sequence[Capture], counted: Sequence[Capture], name: str) -> CorrelatedNoise | None:
+    """Find what neighbouring samples share of a channel's noise; None where that is nothing."""
+    pieces = [*_before_contact(recorded, counted, name), *_after_the_tap(counted, name)]
+    channels: list[Channel | None] = [getattr(tap, name) for tap in counted]
+    step_s = float(np.median([np.median(np.diff(one.time_s)) for one in channels if one is not None]))
+    noise = correlated_noise(pieces, step_s)
+    return noise if noise.parts else None
+
+
+def _told(tap: Capture, recorded: Capture, name: str, std: float, shared: CorrelatedNoise | None) -> Capture:
+    """Tell a tap the noise of a channel: its raster is beside it, and its zero no better known than its mean.
+
+    Before contact a channel stood at what it is counted from, and noise that neighbours share moves that.
+    """
+    channel, whole = getattr(tap, name), getattr(recorded, name)
+    if channel is None:
+        return tap
+    noise_std, zero_std = channel.noise_std, channel.zero_std
+    if noise_std is None:
+        noise_std = math.sqrt(max(std**2 - (channel.resolution or 0.0) ** 2 / 12.0, 0.0))
+    before = len(whole.values) - len(channel.values)
+    if shared is not None and before > 0:
+        zero_std = max(zero_std, shared.mean_std(before))
+    told = replace(channel, noise_std=noise_std, shared_noise=shared, zero_std=zero_std)
+    return replace(tap, force=told) if name == "force" else replace(tap, position=told)
 
 
 def std_of_pieces(pieces: list[Samples]) -> float:
@@ -110,10 +210,10 @@ def _variance_of_mean(rho: float, size: int) -> float:
     return float(1.0 + 2.0 * np.sum((1.0 - lags / size) * rho**lags)) / size
 
 
-def _before_contact(recorded: Campaign, counted: Campaign, name: str) -> Iterator[Samples]:
+def _before_contact(recorded: Sequence[Capture], counted: Sequence[Capture], name: str) -> Iterator[Samples]:
     if name == MOVES_BEFORE_CONTACT:
         return
-    for before, after in zip(recorded.shots, counted.shots, strict=True):
+    for before, after in zip(recorded, counted, strict=True):
         whole, kept = getattr(before, name), getattr(after, name)
         if whole is None or kept is None or whole.noise_std is not None:
             continue
@@ -123,9 +223,9 @@ def _before_contact(recorded: Campaign, counted: Campaign, name: str) -> Iterato
             yield values
 
 
-def _after_the_tap(counted: Campaign, name: str) -> Iterator[Samples]:
+def _after_the_tap(counted: Sequence[Capture], name: str) -> Iterator[Samples]:
     """Last samples of each shot, as far back as they lie about the same value."""
-    for shot in counted.shots:
+    for shot in counted:
         channel = getattr(shot, name)
         if channel is None or channel.noise_std is not None:
             continue
