@@ -22,6 +22,8 @@ TOLD_IN = {
 """What the noise of each channel is told in: how many of a unit are one of SI, the unit, its key in YAML."""
 MOVES_BEFORE_CONTACT = "actuator"
 """Channel that has no one value then; after its stroke it has."""
+FREE_AFTER_CONTACT = "force"
+"""Channel that shows nothing but noise after a tap, whatever the part does."""
 LAST_SAMPLES = 3
 """Samples before contact that are left out: contact lies within a sampling step."""
 TAIL_SAMPLES = 40
@@ -81,7 +83,8 @@ def noise_at_rest(
 ) -> Mapping[str, NoiseAtRest]:
     """Find channels whose noise is not stated, and correlated or with outliers: more than neighbours show.
 
-    Taps rest before contact, and where they were not recorded there after they have slid.
+    Taps rest before contact, and where they were not recorded there after they have slid. The force is none
+    after a tap as before it, and some ms before contact show little of hum: it may show its noise in either.
 
     Parameters
     ----------
@@ -92,19 +95,26 @@ def noise_at_rest(
     """
     found = {}
     for channel in CHANNELS:
-        where, resting = "before contact", list(_before_contact(recorded, counted, channel))
-        if not resting and rest_after:
-            where, resting = "after the tap", list(_after_the_tap(counted, channel))
-        if len(resting) < MIN_SHARE * len(counted):
-            continue
-        if not np.median([np.ptp(values) for values in resting]) > 0.0:
-            continue  # an encoder that stands still shows no noise
-        std = std_of_pieces(resting)
-        white = float(np.median([white_noise_std(values) for values in resting]))
-        excess = max(CERTAIN_EXCESS / math.sqrt(sum(map(len, resting))), MIN_EXCESS)
-        if std > (1.0 + excess) * white > 0.0:
-            found[channel] = NoiseAtRest(std, std / white, where)
+        before = list(_before_contact(recorded, counted, channel))
+        rests = {"before contact": before} if before else {}
+        if rest_after and (not before or channel == FREE_AFTER_CONTACT):
+            rests["after the tap"] = list(_after_the_tap(counted, channel))
+        shown = (_shown(where, pieces, len(counted)) for where, pieces in rests.items())
+        if noise := next(filter(None, shown), None):
+            found[channel] = noise
     return found
+
+
+def _shown(where: str, resting: list[Samples], shots: int) -> NoiseAtRest | None:
+    """Give the noise that pieces at rest show, if it is more than neighbouring samples of them do."""
+    if len(resting) < MIN_SHARE * shots:
+        return None
+    if not np.median([np.ptp(values) for values in resting]) > 0.0:
+        return None  # an encoder that stands still shows no noise
+    std = std_of_pieces(resting)
+    white = float(np.median([white_noise_std(values) for values in resting]))
+    excess = max(CERTAIN_EXCESS / math.sqrt(sum(map(len, resting))), MIN_EXCESS)
+    return NoiseAtRest(std, std / white, where) if std > (1.0 + excess) * white > 0.0 else None
 
 
 def with_noise_at_rest(
