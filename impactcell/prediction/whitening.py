@@ -8,11 +8,13 @@ filter goes through the data, the model, its derivatives and every disturbance, 
 A block is the mean of some samples. Noise of first order has its value x at the last of them and their mean
 for a state: by x before, a gap g before the first of m samples of step s, with a = exp(-g / decay) and
 r = exp(-s / decay), the next x is a r^(m-1) x and the mean a c x, c = (1 - r^m) / (m (1 - r)), beside what is
-new in both. A tone turns its value and, a quarter of a period later, that; its mean over a block is smaller.
+new in both. A tone turns its value and, a quarter of a period later, that; its mean over a block is its value
+in the middle times a factor. Of one that fades, blocks share with each other what its unfading kind would, but
+the mean of one scatters by less: so much is taken off what each has of its own.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -66,7 +68,9 @@ def whitening(noise: CorrelatedNoise, times: Samples, count: Samples, factor: Sa
         of_part = _tone if part.frequency_hz else _first_order
         transition[:, k], renewed[:, k], loading[:, k] = of_part(part, times, count, noise.step_s)
     whole = noise.std**2
-    own = np.maximum(noise.white_std**2 / count, LEAST_WHITE * whole) + (factor**2 - 1.0) * whole / count
+    faded = sum(_faded(part, count, noise.step_s) for part in noise.parts if part.frequency_hz)
+    own = np.maximum(noise.white_std**2 / count - faded, LEAST_WHITE * whole)
+    own += (factor**2 - 1.0) * whole / count
     shown = loading.reshape(len(times), -1)
     gains, variance = _gains(transition, renewed, shown, own)
     return Whitening(np.sqrt(variance), transition, shown, gains)
@@ -107,8 +111,14 @@ def _tone(
     cosine, sine = kept * np.cos(angle), kept * np.sin(angle)
     transition = np.array([[cosine, -sine], [sine, cosine]]).transpose(2, 0, 1)
     renewed = part.std**2 * (1.0 - kept**2)[:, None, None] * np.eye(2)
-    shown = np.sqrt(_mean_variances(part, count, step_s))
+    shown = np.sqrt(_mean_variances(replace(part, decay_s=math.inf), count, step_s))
     return transition, renewed, np.column_stack([shown, np.zeros(len(times))])
+
+
+def _faded(part: SharedPart, count: Samples, step_s: float) -> Samples:
+    """Variance by which the mean of each block of a tone scatters less than of one that does not fade."""
+    unfading = _mean_variances(replace(part, decay_s=math.inf), count, step_s)
+    return part.std**2 * (unfading - _mean_variances(part, count, step_s))
 
 
 def _mean_variances(part: SharedPart, count: Samples, step_s: float) -> Samples:
