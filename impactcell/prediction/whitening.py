@@ -9,8 +9,8 @@ A block is the mean of some samples. Noise of first order has its value x at the
 for a state: by x before, a gap g before the first of m samples of step s, with a = exp(-g / decay) and
 r = exp(-s / decay), the next x is a r^(m-1) x and the mean a c x, c = (1 - r^m) / (m (1 - r)), beside what is
 new in both. A tone turns its value and, a quarter of a period later, that; its mean over a block is its value
-in the middle times a factor. Of one that fades, blocks share with each other what its unfading kind would, but
-the mean of one scatters by less: so much is taken off what each has of its own.
+in the middle times a factor. Of one that fades, blocks share with each other what its unfading kind would,
+but the mean of one scatters by less: so much is taken off what each has of its own.
 """
 
 import math
