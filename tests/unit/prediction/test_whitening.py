@@ -36,7 +36,7 @@ def dense(noise: CorrelatedNoise, sizes: list[int]) -> tuple[np.ndarray, np.ndar
 @pytest.mark.parametrize("name", NOISES)
 @pytest.mark.parametrize("sizes", [[1] * 40, [2] * 40, [2, 2, 1, 1, 1, 2, 3, 5, 1, 2] * 4])
 def test_innovations_have_the_likelihood_of_the_covariance(name: str, sizes: list[int]) -> None:
-    """Of a tone the mean is taken as its value in the middle times a factor: exact to first order in its fading."""
+    """The mean of a tone is its value in the middle times a factor: exact to first order in its fading."""
     noise = NOISES[name]
     times, covariance, _ = dense(noise, sizes)
     found = whitening(noise, times, np.array(sizes, dtype=float), np.ones(len(sizes)))
