@@ -81,6 +81,16 @@ def test_velocities_that_were_measured_are_of_one_setting_up_to_two_per_cent() -
     assert replicate_groups(measured, [0] * 36) == replicate_groups(told, [0] * 36)
 
 
+@pytest.mark.parametrize("shots", [8, 30, 60, 200])
+def test_velocities_that_were_drawn_at_random_are_no_settings(shots: int) -> None:
+    """Some lie within two per cent of each other by chance: that makes no replicates of them."""
+    taken = 0
+    for seed in range(300):
+        drawn = np.random.default_rng(seed).uniform(2000.0 / 60e3, 6000.0 / 60e3, shots)
+        taken += sorted(velocity_settings(with_velocities(drawn.tolist()))) != list(range(shots))
+    assert taken <= 3
+
+
 def test_velocities_that_were_told_are_compared_as_told() -> None:
     assert velocity_settings(with_velocities([0.05, 0.0501] * 4)) == [0, 1] * 4
     assert velocity_settings(with_velocities([math.nan] * 3)) == [0, 0, 0]

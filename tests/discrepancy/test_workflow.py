@@ -288,7 +288,7 @@ def test_a_unit_that_is_wrong_is_told_with_the_campaign_that_has_it(tmp_path: Pa
 def test_missing_channels_and_replicates_are_said() -> None:
     given = make(shots=24)
     jittered = [
-        replace(shot, actuator=None, force=None, velocity_m_s=shot.velocity_m_s * (1.0 + 1e-6 * i))
+        replace(shot, actuator=None, force=None, mass_kg=shot.mass_kg * (1.0 + 1e-6 * i))
         for i, shot in enumerate(given.shots)
     ]
     found = investigate(replace(given, shots=tuple(jittered)))
