@@ -9,6 +9,7 @@ import numpy as np
 from impactcell.features.noise import white_noise_std
 from impactcell.features.noise_kernel import correlated_noise
 from impactcell.records import Capture, Channel, CorrelatedNoise, Samples
+from impactcell.records.correlated_noise import variance_of_mean
 
 CHANNELS = ("force", "position", "actuator")
 """Channels that are looked at."""
@@ -206,18 +207,13 @@ def std_of_pieces(pieces: list[Samples]) -> float:
     product = sum(float(values[1:] @ values[:-1]) for values in centred)
     ratio = product / sum(len(values) - 1 for values in centred) / square
     size = int(np.median([len(values) for values in centred]))
+    lags = np.arange(1.0, size)
     low, high = 0.0, 1.0 - 1.0 / size
     for _ in range(BISECTIONS):
         rho = 0.5 * (low + high)
-        v = _variance_of_mean(rho, size)
+        v = variance_of_mean(rho**lags)
         low, high = (rho, high) if (rho - v) / (1.0 - v) < ratio else (low, rho)
-    return math.sqrt(square / (1.0 - _variance_of_mean(low, size)))
-
-
-def _variance_of_mean(rho: float, size: int) -> float:
-    """Variance of the mean of so many samples of noise of first order, over that of one."""
-    lags = np.arange(1, size)
-    return float(1.0 + 2.0 * np.sum((1.0 - lags / size) * rho**lags)) / size
+    return math.sqrt(square / (1.0 - variance_of_mean(low**lags)))
 
 
 def _before_contact(recorded: Sequence[Capture], counted: Sequence[Capture], name: str) -> Iterator[Samples]:

@@ -68,7 +68,11 @@ class CorrelatedNoise:
 
 def mean_variance(part: SharedPart, count: int, step_s: float) -> float:
     """Variance of the mean of so many consecutive samples of a part, over that of one."""
-    lags = np.arange(1.0, count)
-    shares = 1.0 - lags / count
-    pairs = float(shares @ part.correlation(lags * step_s))
-    return max(1.0 + 2.0 * pairs, 0.0) / count
+    return variance_of_mean(part.correlation(np.arange(1.0, count) * step_s))
+
+
+def variance_of_mean(correlation: NDArray[np.float64]) -> float:
+    """Variance of the mean of n samples over that of one, by their correlation at lags 1 to n - 1."""
+    count = len(correlation) + 1
+    shares = 1.0 - np.arange(1.0, count) / count
+    return max(1.0 + 2.0 * float(shares @ correlation), 0.0) / count
