@@ -109,8 +109,9 @@ def prior_of(model: Model, parameters: int = PARAMETERS) -> GaussianPrior:
             plant.damping_n_s_per_m / prior.damping_std_n_s_per_m,
         ]
     )
-    told = np.ones(parameters - PARAMETERS)
-    return GaussianPrior(np.append(parameters_of(plant), 0.0 * told), np.append(weight, told))
+    beyond = parameters - PARAMETERS
+    mean = np.append(parameters_of(plant), np.zeros(beyond))
+    return GaussianPrior(mean, np.append(weight, np.ones(beyond)))
 
 
 def fit(features: Features, model: Model) -> WaveformFit:
