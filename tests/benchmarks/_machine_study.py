@@ -27,11 +27,11 @@ from impactcell.discrepancy.machine import (
     TermChoice,
     investigate_machine,
 )
-from impactcell.discrepancy.machine.law_terms import SMOOTH_LAW
-from impactcell.discrepancy.machine.machine_fits import MachineFits
-from impactcell.discrepancy.machine.proof import gap as held_out_gap
-from impactcell.discrepancy.machine.trials import ChosenTerm
-from impactcell.discrepancy.machine.uniform_records import uniform_records
+from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
+from impactcell.discrepancy.machine.fits.proof import gap as held_out_gap
+from impactcell.discrepancy.machine.records.uniform_records import uniform_records
+from impactcell.discrepancy.machine.regression.trials import ChosenTerm
+from impactcell.discrepancy.machine.terms.law_terms import SMOOTH_LAW
 from impactcell.records import Capture, Channel, Samples
 from tests.benchmarks.table import Table
 

@@ -24,7 +24,7 @@ from impactcell.discrepancy.machine import (
     investigate_machine,
     simulate_held_out,
 )
-from impactcell.discrepancy.machine.uniform_records import uniform_records
+from impactcell.discrepancy.machine.records.uniform_records import uniform_records
 from impactcell.discrepancy.report import german_sentences
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.errors import CampaignError, SettingsError
@@ -193,7 +193,7 @@ def test_what_the_simulation_contradicts_is_not_named(monkeypatch: pytest.Monkey
         added = any(term.choice.name == name for term in model.terms)
         return replace(error, rmse=rise[-1] if added else 1.0)
 
-    monkeypatch.setattr("impactcell.discrepancy.machine.simulation.simulate_held_out", erring)
+    monkeypatch.setattr("impactcell.discrepancy.machine.simulation.held_out.simulate_held_out", erring)
     assert establish_in(seal(0.8), SEAL).established == (name,)
     rise.append(1.2)
     finding = establish_in(seal(0.8), SEAL)

@@ -9,8 +9,8 @@ import pytest
 
 from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, Response, investigate_machine
-from impactcell.discrepancy.machine.record_notes import notes_of_records
-from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
+from impactcell.discrepancy.machine.records.record_notes import notes_of_records
+from impactcell.discrepancy.machine.records.uniform_records import UniformRecord, uniform_records
 from impactcell.discrepancy.report.german_notes import note as german_note
 from impactcell.records import Capture, Channel
 from tests.discrepancy.stick_slip import SLIDE, sines, slides

@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import BaseModel, investigate_machine
-from impactcell.discrepancy.machine.fine_sampling import finely_sampled, highest_frequency
-from impactcell.discrepancy.machine.uniform_records import UniformRecord
+from impactcell.discrepancy.machine.records.fine_sampling import finely_sampled, highest_frequency
+from impactcell.discrepancy.machine.records.uniform_records import UniformRecord
 from impactcell.discrepancy.report import german_machine_sentences, machine_sentences
 from impactcell.discrepancy.report.german_notes import note as german_note
 from impactcell.discrepancy.report.machine_result import machine_document

@@ -31,8 +31,8 @@ from impactcell.discrepancy.machine.column_slips import (
     ColumnSlip,
     with_degrees_asked_for,
 )
-from impactcell.discrepancy.machine.held_numbers import held_numbers
-from impactcell.discrepancy.machine.law_refusal import refusal_of
+from impactcell.discrepancy.machine.laws.law_refusal import refusal_of
+from impactcell.discrepancy.machine.search.held_numbers import held_numbers
 from impactcell.discrepancy.report import german_machine_sentences, german_sentences, machine_sentences
 from impactcell.errors import CampaignError
 from impactcell.records import Capture, Channel, Samples

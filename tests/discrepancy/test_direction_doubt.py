@@ -10,15 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from impactcell.discrepancy.machine import (
-    MachineFinding,
-    NumberPrior,
-    TermChoice,
-    investigate_machine,
-    smoothing,
-)
-from impactcell.discrepancy.machine.direction_doubt import DirectionDoubt, floors_left, weighed
-from impactcell.discrepancy.machine.weak_form import KINK_SHARE, Rows
+from impactcell.discrepancy.machine import MachineFinding, NumberPrior, TermChoice, investigate_machine
+from impactcell.discrepancy.machine.records import smoothing
+from impactcell.discrepancy.machine.regression.direction_doubt import DirectionDoubt, floors_left, weighed
+from impactcell.discrepancy.machine.regression.weak_form import KINK_SHARE, Rows
 from impactcell.discrepancy.report import german_machine_sentences
 from impactcell.discrepancy.report.machine_sentences import headline
 from impactcell.records import Samples

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from impactcell.api.machine_findings import write_machine_findings
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import BaseModel, MachineFinding, NumberPrior, investigate_machine
-from impactcell.discrepancy.machine.simulation import simulate_held_out
+from impactcell.discrepancy.machine.simulation.held_out import simulate_held_out
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.records import Capture, Channel
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from impactcell.discrepancy.machine import TermChoice
-from impactcell.discrepancy.machine.selection import END_OF_RANGE, SelectionStep, _beside_smooth_force
-from impactcell.discrepancy.machine.trials import ChosenTerm, Trial
+from impactcell.discrepancy.machine.regression.trials import ChosenTerm, Trial
+from impactcell.discrepancy.machine.search.selection import END_OF_RANGE, SelectionStep, _beside_smooth_force
 
 WAVE = TermChoice("periodic_force")
 GAINS = np.ones(8)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from impactcell.discrepancy.machine import TermChoice, investigate_machine
-from impactcell.discrepancy.machine.uniform_records import uniform_records
+from impactcell.discrepancy.machine.records.uniform_records import uniform_records
 from impactcell.records import Samples
 from tests.discrepancy.stick_slip import SLIDE, VISCOUS_N_S_PER_M, slides
 

@@ -16,9 +16,9 @@ from impactcell.discrepancy.machine import (
     TermChoice,
     investigate_machine,
 )
-from impactcell.discrepancy.machine.motion_scale import half_supports, motion_scale, widening
-from impactcell.discrepancy.machine.uniform_records import uniform_records
-from impactcell.discrepancy.machine.weak_form import build_rows
+from impactcell.discrepancy.machine.records.motion_scale import half_supports, motion_scale, widening
+from impactcell.discrepancy.machine.records.uniform_records import uniform_records
+from impactcell.discrepancy.machine.regression.weak_form import build_rows
 from impactcell.discrepancy.report import german_machine_sentences, german_sentences
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.records import Capture, Channel

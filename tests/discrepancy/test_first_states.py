@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, TermChoice
-from impactcell.discrepancy.machine.finding import FittedModel
-from impactcell.discrepancy.machine.regression import LinearFit
-from impactcell.discrepancy.machine.simulation import positions_from, simulate_held_out
-from impactcell.discrepancy.machine.trials import ChosenTerm
-from impactcell.discrepancy.machine.uniform_records import UniformRecord
+from impactcell.discrepancy.machine.fits.fitted_model import FittedModel
+from impactcell.discrepancy.machine.records.uniform_records import UniformRecord
+from impactcell.discrepancy.machine.regression.block_sums import LinearFit
+from impactcell.discrepancy.machine.regression.trials import ChosenTerm
+from impactcell.discrepancy.machine.simulation.held_out import positions_from, simulate_held_out
 from impactcell.records import Samples
 
 MASS, PUSH, COULOMB, UPHILL, NOISE = 0.6, 0.3, 0.06, 0.15, 5e-4

@@ -9,9 +9,9 @@ import pytest
 
 from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.machine import NumberPrior, investigate_machine
-from impactcell.discrepancy.machine.held_numbers import sampling_step_s
-from impactcell.discrepancy.machine.smoothing import test_function as weights_of
-from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
+from impactcell.discrepancy.machine.records.smoothing import test_function as weights_of
+from impactcell.discrepancy.machine.records.uniform_records import UniformRecord, uniform_records
+from impactcell.discrepancy.machine.search.held_numbers import sampling_step_s
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.records import Capture, Channel, Samples
 from tests.discrepancy.stick_slip import SLIDE, sines, slides

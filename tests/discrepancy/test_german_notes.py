@@ -8,14 +8,10 @@ from types import FunctionType, ModuleType
 import pytest
 
 from impactcell.discrepancy.laws import finding as shot_laws
-from impactcell.discrepancy.machine import (
-    CATALOGUE,
-    FREE_FORMS,
-    investigation,
-    law_refusal,
-    record_notes,
-    selection,
-)
+from impactcell.discrepancy.machine import CATALOGUE, FREE_FORMS, investigation
+from impactcell.discrepancy.machine.laws import law_refusal
+from impactcell.discrepancy.machine.records import record_notes
+from impactcell.discrepancy.machine.search import selection
 from impactcell.discrepancy.report import (
     german_machine_sentences,
     german_sentences,

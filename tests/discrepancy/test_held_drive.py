@@ -12,13 +12,13 @@ import pytest
 
 from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.machine import BaseModel, MachineFinding, NumberPrior, investigate_machine
-from impactcell.discrepancy.machine.experiment_design import _changes
-from impactcell.discrepancy.machine.finding import FittedModel
-from impactcell.discrepancy.machine.regression import LinearFit
-from impactcell.discrepancy.machine.simulation import simulate_held_out
-from impactcell.discrepancy.machine.trials import ChosenTerm
-from impactcell.discrepancy.machine.uniform_records import uniform_records
-from impactcell.discrepancy.machine.weak_form import build_rows
+from impactcell.discrepancy.machine.fits.fitted_model import FittedModel
+from impactcell.discrepancy.machine.records.uniform_records import uniform_records
+from impactcell.discrepancy.machine.regression.block_sums import LinearFit
+from impactcell.discrepancy.machine.regression.trials import ChosenTerm
+from impactcell.discrepancy.machine.regression.weak_form import build_rows
+from impactcell.discrepancy.machine.simulation.experiment_design import _changes
+from impactcell.discrepancy.machine.simulation.held_out import simulate_held_out
 from impactcell.discrepancy.report.german_notes import note as german_note
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.features import drive_noise_std

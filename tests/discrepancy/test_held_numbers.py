@@ -22,13 +22,13 @@ from impactcell.discrepancy.machine import (
     TermChoice,
     investigate_machine,
 )
-from impactcell.discrepancy.machine.explained_by_numbers import Explained, held_number_notes
-from impactcell.discrepancy.machine.held_numbers import HeldNumber, held_numbers, told_from_number
-from impactcell.discrepancy.machine.regression import blocks_of
-from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS
-from impactcell.discrepancy.machine.selection import select_terms
-from impactcell.discrepancy.machine.trials import TermSearch
-from impactcell.discrepancy.machine.weak_form import Rows
+from impactcell.discrepancy.machine.regression.block_sums import blocks_of
+from impactcell.discrepancy.machine.regression.trials import TermSearch
+from impactcell.discrepancy.machine.regression.weak_form import Rows
+from impactcell.discrepancy.machine.search.explained_by_numbers import Explained, held_number_notes
+from impactcell.discrepancy.machine.search.held_numbers import HeldNumber, held_numbers, told_from_number
+from impactcell.discrepancy.machine.search.selection import select_terms
+from impactcell.discrepancy.machine.terms.rival_forms import FREE_FORMS, KNOTS
 from impactcell.discrepancy.report import german_machine_sentences, german_sentences, machine_sentences
 from impactcell.records import Capture, Channel, Samples
 from tests.benchmarks._machine_held import FAULTS, investigated

@@ -10,12 +10,12 @@ import pytest
 
 from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, Response, TermChoice
-from impactcell.discrepancy.machine.finding import FittedModel
-from impactcell.discrepancy.machine.held_out_stretch import constant_forces, drifts
-from impactcell.discrepancy.machine.regression import LinearFit
-from impactcell.discrepancy.machine.simulation import simulate_held_out
-from impactcell.discrepancy.machine.trials import ChosenTerm
-from impactcell.discrepancy.machine.uniform_records import UniformRecord
+from impactcell.discrepancy.machine.fits.fitted_model import FittedModel
+from impactcell.discrepancy.machine.records.held_out_stretch import constant_forces, drifts
+from impactcell.discrepancy.machine.records.uniform_records import UniformRecord
+from impactcell.discrepancy.machine.regression.block_sums import LinearFit
+from impactcell.discrepancy.machine.regression.trials import ChosenTerm
+from impactcell.discrepancy.machine.simulation.held_out import simulate_held_out
 from impactcell.records import Capture
 from tests.discrepancy import test_ramped_axis as ramped
 

@@ -19,14 +19,14 @@ from impactcell.discrepancy.machine import (
     TermChoice,
     investigate_machine,
 )
-from impactcell.discrepancy.machine.look_alikes import (
+from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
+from impactcell.discrepancy.machine.records.uniform_records import uniform_records
+from impactcell.discrepancy.machine.regression.trials import ChosenTerm
+from impactcell.discrepancy.machine.search.look_alikes import (
     like_the_machine,
     machine_parts,
     parts_that_may_be_off,
 )
-from impactcell.discrepancy.machine.machine_fits import MachineFits
-from impactcell.discrepancy.machine.trials import ChosenTerm
-from impactcell.discrepancy.machine.uniform_records import uniform_records
 from impactcell.discrepancy.report import german_machine_sentences, german_sentences, machine_sentences
 from impactcell.records import Capture, Channel, Samples
 from tests.discrepancy.stick_slip import SLIDE, VISCOUS_N_S_PER_M, sines, slides

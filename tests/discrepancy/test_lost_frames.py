@@ -9,9 +9,9 @@ from scipy.integrate import solve_ivp
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, investigate_machine
-from impactcell.discrepancy.machine.smoothing import test_function as function_of_test
-from impactcell.discrepancy.machine.uneven_steps import at_equal_steps
-from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
+from impactcell.discrepancy.machine.records.smoothing import test_function as function_of_test
+from impactcell.discrepancy.machine.records.uneven_steps import at_equal_steps
+from impactcell.discrepancy.machine.records.uniform_records import UniformRecord, uniform_records
 from impactcell.features import white_noise_std
 from impactcell.records import Capture, Channel
 

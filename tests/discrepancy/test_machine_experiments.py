@@ -15,11 +15,11 @@ from impactcell.discrepancy.machine import (
     NumberPrior,
     Response,
     TermChoice,
-    experiment_design,
     investigate_machine,
 )
-from impactcell.discrepancy.machine.machine_fits import MachineFits
-from impactcell.discrepancy.machine.uniform_records import uniform_records
+from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
+from impactcell.discrepancy.machine.records.uniform_records import uniform_records
+from impactcell.discrepancy.machine.simulation import experiment_design
 from impactcell.records import Capture, Channel
 from tests.discrepancy.test_base_model import GRAVITY, INERTIA, pendulum, swings
 

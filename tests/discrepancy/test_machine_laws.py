@@ -28,16 +28,15 @@ from impactcell.discrepancy.machine import (
     Response,
     TermChoice,
     investigate_machine,
-    law_proof,
-    law_search,
     simulate_held_out,
-    simulation,
 )
-from impactcell.discrepancy.machine.base_model import LawForm
-from impactcell.discrepancy.machine.finding import FittedModel
-from impactcell.discrepancy.machine.free_splines import FreeSpline
-from impactcell.discrepancy.machine.regression import LinearFit
-from impactcell.discrepancy.machine.trials import ChosenTerm
+from impactcell.discrepancy.machine.fits.fitted_model import FittedModel
+from impactcell.discrepancy.machine.laws import law_proof, law_search
+from impactcell.discrepancy.machine.laws.free_splines import FreeSpline
+from impactcell.discrepancy.machine.regression.block_sums import LinearFit
+from impactcell.discrepancy.machine.regression.trials import ChosenTerm
+from impactcell.discrepancy.machine.simulation import held_out as simulation
+from impactcell.discrepancy.machine.terms.base_model import LawForm
 from impactcell.discrepancy.report import (
     german_machine_sentences,
     german_notes,

@@ -9,24 +9,20 @@ import numpy as np
 import pytest
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
-from impactcell.discrepancy.machine import (
-    NumberPrior,
-    OpenLoopError,
-    channel_values,
-    investigation,
-    proof,
-    simulation,
-)
+from impactcell.discrepancy.machine import NumberPrior, OpenLoopError, investigation
 from impactcell.discrepancy.machine import finding as machine_finding
-from impactcell.discrepancy.machine.base_model import BaseModel, Response
 from impactcell.discrepancy.machine.finding import Remainder
-from impactcell.discrepancy.machine.record_notes import notes_of_records
-from impactcell.discrepancy.machine.regression import blocks_of
-from impactcell.discrepancy.machine.remainder import remainder_of
-from impactcell.discrepancy.machine.rival_forms import hats
-from impactcell.discrepancy.machine.trials import TermSearch
-from impactcell.discrepancy.machine.uniform_records import uniform_records
-from impactcell.discrepancy.machine.weak_form import Rows
+from impactcell.discrepancy.machine.fits import proof
+from impactcell.discrepancy.machine.fits.remainder import remainder_of
+from impactcell.discrepancy.machine.records import channel_values
+from impactcell.discrepancy.machine.records.record_notes import notes_of_records
+from impactcell.discrepancy.machine.records.uniform_records import uniform_records
+from impactcell.discrepancy.machine.regression.block_sums import blocks_of
+from impactcell.discrepancy.machine.regression.trials import TermSearch
+from impactcell.discrepancy.machine.regression.weak_form import Rows
+from impactcell.discrepancy.machine.simulation import held_out as simulation
+from impactcell.discrepancy.machine.terms.base_model import BaseModel, Response
+from impactcell.discrepancy.machine.terms.rival_forms import hats
 from impactcell.discrepancy.report.simulation_notes import notes_of_simulation
 from impactcell.errors import CampaignError
 from impactcell.records import Capture, Channel

@@ -16,17 +16,17 @@ from impactcell.discrepancy.machine import (
     TermChoice,
     investigate_machine,
 )
-from impactcell.discrepancy.machine.held_numbers import (
+from impactcell.discrepancy.machine.regression.block_sums import blocks_of
+from impactcell.discrepancy.machine.regression.trials import TermSearch
+from impactcell.discrepancy.machine.regression.weak_form import Rows
+from impactcell.discrepancy.machine.search.held_numbers import (
     DELAY,
     HeldNumber,
     held_numbers,
     told_from_number,
 )
-from impactcell.discrepancy.machine.regression import blocks_of
-from impactcell.discrepancy.machine.rival_forms import FREE_FORMS, KNOTS
-from impactcell.discrepancy.machine.selection import SelectionStep, select_terms
-from impactcell.discrepancy.machine.trials import TermSearch
-from impactcell.discrepancy.machine.weak_form import Rows
+from impactcell.discrepancy.machine.search.selection import SelectionStep, select_terms
+from impactcell.discrepancy.machine.terms.rival_forms import FREE_FORMS, KNOTS
 from impactcell.records import Capture, Channel, Samples
 
 MASS_KG, COULOMB_N, VISCOUS_N_S_PER_M = 2.0, 1.5, 4.0

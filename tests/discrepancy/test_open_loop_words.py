@@ -14,7 +14,7 @@ from impactcell.campaign import Campaign, Coordinate, Excitation, write
 from impactcell.cli.estimate import estimate
 from impactcell.discrepancy.data import prepare
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, investigate_machine
-from impactcell.discrepancy.machine.record_checks import check_blocks
+from impactcell.discrepancy.machine.fits.record_checks import check_blocks
 from impactcell.discrepancy.report import sentences
 from impactcell.errors import CampaignError
 from impactcell.german.findings import german_headline

@@ -5,7 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from impactcell.discrepancy.machine.channel_values import cleaned_position, without_outliers, without_spikes
+from impactcell.discrepancy.machine.records.channel_values import (
+    cleaned_position,
+    without_outliers,
+    without_spikes,
+)
 from impactcell.records import Samples
 
 STEP_S, NOISE = 2e-3, 2e-5

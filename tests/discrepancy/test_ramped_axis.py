@@ -8,9 +8,9 @@ import pytest
 from impactcell.campaign import Campaign, Excitation
 from impactcell.discrepancy.machine import CATALOGUE, BaseModel, MachineFinding, NumberPrior, TermChoice
 from impactcell.discrepancy.machine.establishing import establish
-from impactcell.discrepancy.machine.machine_fits import MachineFits
-from impactcell.discrepancy.machine.motion_scale import motion_scale
-from impactcell.discrepancy.machine.uniform_records import uniform_records
+from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
+from impactcell.discrepancy.machine.records.motion_scale import motion_scale
+from impactcell.discrepancy.machine.records.uniform_records import uniform_records
 from impactcell.records import Capture, Channel
 
 MASS, COULOMB, VISCOUS, DIFFERS = 95.0, 20.0, 200.0, -37.0

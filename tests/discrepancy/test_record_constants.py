@@ -19,9 +19,9 @@ from impactcell.discrepancy.machine import (
     investigate_machine,
 )
 from impactcell.discrepancy.machine.finding import Remainder
-from impactcell.discrepancy.machine.nuisance_priors import OFFSET
-from impactcell.discrepancy.machine.record_constants import constants_note, without_constants
-from impactcell.discrepancy.machine.weak_form import Rows
+from impactcell.discrepancy.machine.regression.nuisance_priors import OFFSET
+from impactcell.discrepancy.machine.regression.record_constants import constants_note, without_constants
+from impactcell.discrepancy.machine.regression.weak_form import Rows
 from impactcell.discrepancy.report import german_sentences
 from impactcell.discrepancy.report.simulation_notes import BY_RECORD, notes_of_simulation
 from impactcell.errors import SettingsError

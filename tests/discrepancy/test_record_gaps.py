@@ -10,9 +10,9 @@ import pytest
 
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, Response, investigate_machine
-from impactcell.discrepancy.machine.fine_sampling import finely_sampled
-from impactcell.discrepancy.machine.held_out_stretch import between_gaps
-from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
+from impactcell.discrepancy.machine.records.fine_sampling import finely_sampled
+from impactcell.discrepancy.machine.records.held_out_stretch import between_gaps
+from impactcell.discrepancy.machine.records.uniform_records import UniformRecord, uniform_records
 from impactcell.errors import CampaignError
 from impactcell.records import Capture
 from tests.discrepancy.stick_slip import SLIDE, sines, slides

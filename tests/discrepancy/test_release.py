@@ -8,8 +8,8 @@ import pytest
 
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, investigate_machine
-from impactcell.discrepancy.machine.release import from_release
-from impactcell.discrepancy.machine.uniform_records import uniform_records
+from impactcell.discrepancy.machine.records.release import from_release
+from impactcell.discrepancy.machine.records.uniform_records import uniform_records
 from impactcell.discrepancy.report import german_sentences
 from impactcell.errors import CampaignError
 from impactcell.records import Capture, Channel

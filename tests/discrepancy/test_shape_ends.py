@@ -5,9 +5,9 @@ import pytest
 
 from impactcell.campaign import Coordinate
 from impactcell.discrepancy.machine import ChosenTerm, MachineFinding, TermChoice, investigate_machine
-from impactcell.discrepancy.machine.selection import END_OF_RANGE, SelectionStep
-from impactcell.discrepancy.machine.shape_ends import with_ends_named
-from impactcell.discrepancy.machine.trials import Trial
+from impactcell.discrepancy.machine.regression.trials import Trial
+from impactcell.discrepancy.machine.search.selection import END_OF_RANGE, SelectionStep
+from impactcell.discrepancy.machine.search.shape_ends import with_ends_named
 from impactcell.discrepancy.report import german_machine_sentences, german_sentences, machine_sentences
 from tests.discrepancy.test_moves_between_places import AXIS, axis
 

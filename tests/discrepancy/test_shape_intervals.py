@@ -17,11 +17,11 @@ from impactcell.discrepancy.machine import (
     NumberPrior,
     TermChoice,
 )
-from impactcell.discrepancy.machine.machine_fits import MachineFits
-from impactcell.discrepancy.machine.regression import blocks_of, fit_blocks
-from impactcell.discrepancy.machine.shape_intervals import with_shape_intervals
-from impactcell.discrepancy.machine.uniform_records import uniform_records
-from impactcell.discrepancy.machine.weak_form import Rows, build_rows
+from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
+from impactcell.discrepancy.machine.fits.shape_intervals import with_shape_intervals
+from impactcell.discrepancy.machine.records.uniform_records import uniform_records
+from impactcell.discrepancy.machine.regression.block_sums import blocks_of, fit_blocks
+from impactcell.discrepancy.machine.regression.weak_form import Rows, build_rows
 from impactcell.records import Capture, Channel, Samples
 from tests.discrepancy.stick_slip import sines
 

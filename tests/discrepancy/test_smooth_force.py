@@ -10,18 +10,13 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from impactcell.api.machine_findings import write_machine_findings
-from impactcell.discrepancy.machine import (
-    MIN_NEED,
-    MachineFinding,
-    NumberPrior,
-    investigate_machine,
-    smooth_force,
-    smooth_waves,
-)
-from impactcell.discrepancy.machine.selection import SMOOTH_FORCE
-from impactcell.discrepancy.machine.smooth_force import NAME, SmoothForce, smooth_force_columns
-from impactcell.discrepancy.machine.terms import MotionState
-from impactcell.discrepancy.machine.weak_form import Column, Rows
+from impactcell.discrepancy.machine import MIN_NEED, MachineFinding, NumberPrior, investigate_machine
+from impactcell.discrepancy.machine.regression import smooth_force
+from impactcell.discrepancy.machine.regression.smooth_force import NAME, SmoothForce, smooth_force_columns
+from impactcell.discrepancy.machine.regression.weak_form import Column, Rows
+from impactcell.discrepancy.machine.search.selection import SMOOTH_FORCE
+from impactcell.discrepancy.machine.terms import smooth_waves
+from impactcell.discrepancy.machine.terms.catalogue import MotionState
 from impactcell.discrepancy.report.machine_page import format_need
 from impactcell.records import Samples
 from tests.discrepancy.smooth_slide import SLIDE, Law, slide, wandering

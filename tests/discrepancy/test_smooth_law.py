@@ -16,12 +16,12 @@ from impactcell.discrepancy.machine import (
     MachineLaw,
     NumberPrior,
     investigate_machine,
-    law_search,
     motions,
     simulate_held_out,
 )
-from impactcell.discrepancy.machine.law_refusal import GIVES_ENERGY, NOT_IN_BLOCKS, not_in_one_place
-from impactcell.discrepancy.machine.smooth_law import SmoothLaw, smooth_law
+from impactcell.discrepancy.machine.laws import law_search
+from impactcell.discrepancy.machine.laws.law_refusal import GIVES_ENERGY, NOT_IN_BLOCKS, not_in_one_place
+from impactcell.discrepancy.machine.laws.smooth_law import SmoothLaw, smooth_law
 from impactcell.discrepancy.report.german_reasons import reason
 from impactcell.records import Samples
 from tests.discrepancy.smooth_slide import SLIDE, Law, slide, wandering

@@ -22,8 +22,8 @@ from impactcell.discrepancy.machine import (
     TermChoice,
     investigate_machine,
 )
-from impactcell.discrepancy.machine.law_refusal import refusal_of
-from impactcell.discrepancy.machine.look_alikes import one_way_note
+from impactcell.discrepancy.machine.laws.law_refusal import refusal_of
+from impactcell.discrepancy.machine.search.look_alikes import one_way_note
 from impactcell.discrepancy.report import german_sentences
 from impactcell.records import Capture, Channel, Samples
 from tests.discrepancy.machine_study import establish_in

@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, TermChoice, investigate_machine
-from impactcell.discrepancy.machine.uniform_records import uniform_records
+from impactcell.discrepancy.machine.records.uniform_records import uniform_records
 from impactcell.discrepancy.report.german_notes import note as german_note
 from impactcell.discrepancy.report.machine_result import machine_document
 from impactcell.discrepancy.report.machine_sentences import noise_keys

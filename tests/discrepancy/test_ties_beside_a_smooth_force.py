@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from impactcell.discrepancy.machine import MachineFinding, TermChoice, tied_models
-from impactcell.discrepancy.machine.finding import FittedModel, OpenLoopError
-from impactcell.discrepancy.machine.ties import needed_as_much
-from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch, Trial
-from impactcell.discrepancy.machine.weak_form import Column
+from impactcell.discrepancy.machine import MachineFinding, TermChoice
+from impactcell.discrepancy.machine.finding import OpenLoopError
+from impactcell.discrepancy.machine.fits.fitted_model import FittedModel
+from impactcell.discrepancy.machine.regression.trials import ChosenTerm, TermSearch, Trial
+from impactcell.discrepancy.machine.regression.weak_form import Column
+from impactcell.discrepancy.machine.search.ties import needed_as_much
+from impactcell.discrepancy.machine.simulation import tied_models
 from impactcell.records import Samples
 from tests.benchmarks._machine_study import run, task
 

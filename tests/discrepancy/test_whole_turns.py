@@ -9,7 +9,7 @@ import pytest
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, investigate_machine
-from impactcell.discrepancy.machine.whole_turns import without_wraps
+from impactcell.discrepancy.machine.records.whole_turns import without_wraps
 from impactcell.discrepancy.report.german_notes import note as german_note
 from impactcell.records import Capture, Channel, Samples
 from tests.discrepancy.test_base_model import INERTIA, pendulum, swings

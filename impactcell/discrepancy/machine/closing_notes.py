@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from impactcell.campaign import COLUMNS
-from impactcell.discrepancy.machine.base_model import Response
 from impactcell.discrepancy.machine.finding import MachineFinding
-from impactcell.discrepancy.machine.held_number import DELAY
-from impactcell.discrepancy.machine.machine_fits import MachineFits
+from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
 from impactcell.discrepancy.machine.open_loop_error import BetterSimulation
-from impactcell.discrepancy.machine.simulation import STEPS_PER_PERIOD, simulate_held_out
-from impactcell.discrepancy.machine.trials import ChosenTerm
+from impactcell.discrepancy.machine.regression.held_number import DELAY
+from impactcell.discrepancy.machine.regression.trials import ChosenTerm
+from impactcell.discrepancy.machine.simulation.held_out import STEPS_PER_PERIOD, simulate_held_out
+from impactcell.discrepancy.machine.terms.base_model import Response
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import POOR_FIT_PERCENT
 from impactcell.physics.effect_names import in_words

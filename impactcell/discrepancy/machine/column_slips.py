@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.campaign import Coordinate
-from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior
-from impactcell.discrepancy.machine.block_plan import BlockPlan
 from impactcell.discrepancy.machine.establishing import establish
 from impactcell.discrepancy.machine.finding import MachineFinding
-from impactcell.discrepancy.machine.machine_fits import MachineFits
-from impactcell.discrepancy.machine.regression import blocks_of, fit_blocks
-from impactcell.discrepancy.machine.simulation import simulate_held_out, with_simulations
-from impactcell.discrepancy.machine.uniform_records import UniformRecord
-from impactcell.discrepancy.machine.weak_form import Column, Rows, build_rows
+from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
+from impactcell.discrepancy.machine.records.uniform_records import UniformRecord
+from impactcell.discrepancy.machine.regression.block_plan import BlockPlan
+from impactcell.discrepancy.machine.regression.block_sums import blocks_of, fit_blocks
+from impactcell.discrepancy.machine.regression.weak_form import Column, Rows, build_rows
+from impactcell.discrepancy.machine.simulation.held_out import simulate_held_out, with_simulations
+from impactcell.discrepancy.machine.terms.base_model import BaseModel, NumberPrior
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import POOR_FIT_PERCENT
 

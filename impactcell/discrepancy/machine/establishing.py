@@ -6,9 +6,18 @@ from dataclasses import replace
 from itertools import takewhile
 from typing import NamedTuple
 
-from impactcell.discrepancy.machine.base_model import TermChoice
 from impactcell.discrepancy.machine.evidence import FallOfGap
-from impactcell.discrepancy.machine.explained_by_numbers import (
+from impactcell.discrepancy.machine.finding import MachineFinding
+from impactcell.discrepancy.machine.fits.fitted_model import FittedModel
+from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
+from impactcell.discrepancy.machine.fits.proof import expected_gap, fall_of_gap, gap
+from impactcell.discrepancy.machine.fits.remainder import remainder_of
+from impactcell.discrepancy.machine.fits.shape_intervals import with_shape_intervals
+from impactcell.discrepancy.machine.regression.block_sums import Blocks
+from impactcell.discrepancy.machine.regression.record_constants import constants_note
+from impactcell.discrepancy.machine.regression.trials import ChosenTerm, TermSearch
+from impactcell.discrepancy.machine.regression.weak_form import Column
+from impactcell.discrepancy.machine.search.explained_by_numbers import (
     Explained,
     absent_gravity_notes,
     blamed_on_number,
@@ -16,25 +25,17 @@ from impactcell.discrepancy.machine.explained_by_numbers import (
     explains_most,
     held_number_notes,
 )
-from impactcell.discrepancy.machine.finding import FittedModel, MachineFinding
-from impactcell.discrepancy.machine.held_numbers import numbers_held, told_from_number
-from impactcell.discrepancy.machine.look_alikes import (
+from impactcell.discrepancy.machine.search.held_numbers import numbers_held, told_from_number
+from impactcell.discrepancy.machine.search.look_alikes import (
     alike_note,
     like_the_machine,
     machine_parts,
     parts_that_may_be_off,
 )
-from impactcell.discrepancy.machine.machine_fits import MachineFits
-from impactcell.discrepancy.machine.proof import expected_gap, fall_of_gap, gap
-from impactcell.discrepancy.machine.record_constants import constants_note
-from impactcell.discrepancy.machine.regression import Blocks
-from impactcell.discrepancy.machine.remainder import remainder_of
-from impactcell.discrepancy.machine.selection import SelectionStep, select_terms
-from impactcell.discrepancy.machine.shape_ends import with_ends_named
-from impactcell.discrepancy.machine.shape_intervals import with_shape_intervals
-from impactcell.discrepancy.machine.ties import needed_as_much, still_tied
-from impactcell.discrepancy.machine.trials import ChosenTerm, TermSearch
-from impactcell.discrepancy.machine.weak_form import Column
+from impactcell.discrepancy.machine.search.selection import SelectionStep, select_terms
+from impactcell.discrepancy.machine.search.shape_ends import with_ends_named
+from impactcell.discrepancy.machine.search.ties import needed_as_much, still_tied
+from impactcell.discrepancy.machine.terms.base_model import TermChoice
 
 WEIGHINGS = 2
 """Rounds of weights by what a model leaves, and of a model by these weights, at least [1]."""

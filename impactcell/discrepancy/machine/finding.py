@@ -5,16 +5,17 @@ from dataclasses import dataclass, field
 
 from impactcell.discrepancy.data import MIN_HELD_OUT, MIN_TRAINING
 from impactcell.discrepancy.laws import FittedFunction
-from impactcell.discrepancy.machine.base_model import BaseModel, Response, TermChoice
 from impactcell.discrepancy.machine.evidence import ClearStrength, FallOfGap
-from impactcell.discrepancy.machine.law_terms import listed_term
-from impactcell.discrepancy.machine.motion_scale import MotionScale
+from impactcell.discrepancy.machine.fits.fitted_model import FittedModel
+from impactcell.discrepancy.machine.fits.remainder import Remainder
 from impactcell.discrepancy.machine.open_loop_error import BetterSimulation, OpenLoopError
-from impactcell.discrepancy.machine.regression import Blocks, LinearFit
-from impactcell.discrepancy.machine.selection import SelectionStep
-from impactcell.discrepancy.machine.trials import ChosenTerm
-from impactcell.discrepancy.machine.uniform_records import UniformRecord
-from impactcell.discrepancy.machine.weak_form import Column
+from impactcell.discrepancy.machine.records.motion_scale import MotionScale
+from impactcell.discrepancy.machine.records.uniform_records import UniformRecord
+from impactcell.discrepancy.machine.regression.block_sums import Blocks
+from impactcell.discrepancy.machine.regression.trials import ChosenTerm
+from impactcell.discrepancy.machine.search.selection import SelectionStep
+from impactcell.discrepancy.machine.terms.base_model import BaseModel, Response, TermChoice
+from impactcell.discrepancy.machine.terms.law_terms import listed_term
 from impactcell.discrepancy.search import Proposal
 from impactcell.german.open_loop import POOR_FIT_PERCENT
 
@@ -22,69 +23,6 @@ LEAST_GAP = 0.5
 """Gap below which the noise is less than half of what it was taken for [1]."""
 FAR_ABOVE_NOISE = 2.0
 """Error of a simulated position over the sensor's noise from which on it is no noise [1]."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FittedModel:
-    """A fitted model of a machine.
-
-    Attributes
-    ----------
-    base : BaseModel
-        With what its data cannot tell held.
-    terms : tuple of ChosenTerm
-        Those of the base model first.
-    fit : LinearFit
-    delay_s : float
-    gravity : float
-        G.
-    shape_intervals : mapping
-        95 % interval of the shape of each term that has one, by the term's name; empty as long as shapes
-        are being compared.
-    """
-
-    base: BaseModel
-    terms: tuple[ChosenTerm, ...]
-    fit: LinearFit
-    delay_s: float
-    gravity: float
-    shape_intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-
-    def value(self, column: Column) -> float:
-        """Coefficient of a column; 0 where the model does not have it."""
-        if column not in self.fit.columns:
-            return 0.0
-        return float(self.fit.coefficients[self.fit.columns.index(column)])
-
-    def term(self, name: str) -> ChosenTerm:
-        """One of its terms."""
-        return next(term for term in self.terms if term.choice.name == name)
-
-    def nuisance(self, name: str) -> float:
-        """Coefficient of a nuisance."""
-        return self.value((name, 0.0, 0))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Remainder:
-    """Residuals of the equation of motion, in squares above the sensors' noise.
-
-    Attributes
-    ----------
-    correlation_s : float
-        Time over which they stay alike.
-    shots : tuple of int
-        The few records in which most of them is, the worst first; none where it is spread.
-    share : float
-        How much of them is in these.
-    constant_share : float
-        How much a constant force of each record's own would take.
-    """
-
-    correlation_s: float
-    shots: tuple[int, ...]
-    share: float
-    constant_share: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)

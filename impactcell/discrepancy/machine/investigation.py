@@ -8,25 +8,25 @@ from fnmatch import fnmatchcase
 import numpy as np
 
 from impactcell.campaign import Campaign
-from impactcell.discrepancy.machine.base_model import BaseModel, NumberPrior, Response, TermChoice
-from impactcell.discrepancy.machine.clear_strengths import with_clear_strengths
 from impactcell.discrepancy.machine.closing_notes import with_closing_notes
 from impactcell.discrepancy.machine.column_slips import slip_in_columns, told_of_slip, with_degrees_asked_for
 from impactcell.discrepancy.machine.establishing import establish
-from impactcell.discrepancy.machine.experiment_design import with_experiments
 from impactcell.discrepancy.machine.finding import MachineFinding
-from impactcell.discrepancy.machine.fine_sampling import finely_sampled
-from impactcell.discrepancy.machine.held_out_stretch import pulls_back
-from impactcell.discrepancy.machine.law_search import with_law
-from impactcell.discrepancy.machine.machine_fits import MachineFits
-from impactcell.discrepancy.machine.record_checks import check_blocks, check_columns, check_delay
-from impactcell.discrepancy.machine.record_notes import notes_of_records
-from impactcell.discrepancy.machine.release import from_release
-from impactcell.discrepancy.machine.simulation import with_simulations
-from impactcell.discrepancy.machine.terms import CATALOGUE
-from impactcell.discrepancy.machine.tied_models import with_tied_models
-from impactcell.discrepancy.machine.uniform_records import UniformRecord, uniform_records
-from impactcell.discrepancy.machine.whole_turns import without_wraps
+from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
+from impactcell.discrepancy.machine.fits.record_checks import check_blocks, check_columns, check_delay
+from impactcell.discrepancy.machine.laws.law_search import with_law
+from impactcell.discrepancy.machine.records.fine_sampling import finely_sampled
+from impactcell.discrepancy.machine.records.held_out_stretch import pulls_back
+from impactcell.discrepancy.machine.records.record_notes import notes_of_records
+from impactcell.discrepancy.machine.records.release import from_release
+from impactcell.discrepancy.machine.records.uniform_records import UniformRecord, uniform_records
+from impactcell.discrepancy.machine.records.whole_turns import without_wraps
+from impactcell.discrepancy.machine.simulation.clear_strengths import with_clear_strengths
+from impactcell.discrepancy.machine.simulation.experiment_design import with_experiments
+from impactcell.discrepancy.machine.simulation.held_out import with_simulations
+from impactcell.discrepancy.machine.simulation.tied_models import with_tied_models
+from impactcell.discrepancy.machine.terms.base_model import BaseModel, NumberPrior, Response, TermChoice
+from impactcell.discrepancy.machine.terms.catalogue import CATALOGUE
 from impactcell.errors import CampaignError
 from impactcell.physics.effect_names import in_words
 from impactcell.quality import Fault, inspect_campaign, notes_of, refuse_unusable
