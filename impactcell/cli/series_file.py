@@ -11,17 +11,17 @@ from pathlib import Path
 from impactcell.cell.series_replay import whole_number_fault
 from impactcell.cli.estimate_columns import COLUMNS as ESTIMATED
 from impactcell.errors import MeasurementError, SeriesError
-from impactcell.measurements.dialect import Dialect, decode, detect, split_cells
-from impactcell.measurements.lines_left_out import (
+from impactcell.measurements.files.dialect import Dialect, decode, detect, split_cells
+from impactcell.measurements.files.lines_left_out import (
     HEADER_AGAIN,
     LONGEST_FOOTER,
     footer_note,
     is_word,
     left_out,
 )
-from impactcell.measurements.numbers import is_grouped, is_missing, parse_number
-from impactcell.measurements.text_layout import is_comment
-from impactcell.measurements.units import parse_unit
+from impactcell.measurements.files.text_layout import is_comment
+from impactcell.measurements.notation.numbers import is_grouped, is_missing, parse_number
+from impactcell.measurements.notation.units import parse_unit
 from impactcell.tracking.wear_batch import FrictionObservation
 
 COLUMNS = ("cycle", "mu_s", "mu_s_std", "batch", "mu_s_common_std")

@@ -10,24 +10,24 @@ import numpy as np
 from impactcell.campaign import COLUMNS, Campaign, Coordinate, Excitation, Sensor
 from impactcell.campaign import write as write_directory
 from impactcell.errors import CampaignError, MeasurementError
-from impactcell.measurements.alike import check_channels_alike, check_scalars_alike, left_empty
-from impactcell.measurements.captures import channel_of, described, direction_of, shot_numbers
-from impactcell.measurements.excitation import SWAPPED, excitation_of, looks_swapped
+from impactcell.measurements.columns.given_values import Given
+from impactcell.measurements.columns.mapping import Mapping
+from impactcell.measurements.columns.recognition import CHANNELS, ColumnMeaning
+from impactcell.measurements.columns.repeated_rows import without_repeats
 from impactcell.measurements.faults import raise_faults
-from impactcell.measurements.given_values import Given
-from impactcell.measurements.mapping import Mapping
-from impactcell.measurements.measured_records import Record
-from impactcell.measurements.recognition import CHANNELS, ColumnMeaning
-from impactcell.measurements.recorders import of_one_recording, records_of
-from impactcell.measurements.repeated_rows import without_repeats
-from impactcell.measurements.stated_constants import (
+from impactcell.measurements.notation.units import Dimension
+from impactcell.measurements.records.alike import check_channels_alike, check_scalars_alike, left_empty
+from impactcell.measurements.records.measured_records import Record
+from impactcell.measurements.records.recorders import of_one_recording, records_of
+from impactcell.measurements.records.stated_constants import (
     has_unread_mass,
     notes_of_stated,
     refuse_unread_velocity,
 )
 from impactcell.measurements.table import Table
-from impactcell.measurements.taps import taps_of
-from impactcell.measurements.units import Dimension
+from impactcell.measurements.taps.captures import channel_of, described, direction_of, shot_numbers
+from impactcell.measurements.taps.cutting import taps_of
+from impactcell.measurements.taps.excitation import SWAPPED, excitation_of, looks_swapped
 from impactcell.quality import Fault, copies, inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Channel, Samples
 

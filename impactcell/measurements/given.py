@@ -7,12 +7,12 @@ from pathlib import Path
 
 from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError, SettingsError
-from impactcell.measurements.gains import Gain, parse_gain
-from impactcell.measurements.given_values import Given
-from impactcell.measurements.numbers import parse_number
-from impactcell.measurements.recognition import CHANNELS, VOCABULARY, ColumnMeaning
-from impactcell.measurements.taps import NO_TRIGGER
-from impactcell.measurements.units import Dimension, parse_unit
+from impactcell.measurements.columns.given_values import Given
+from impactcell.measurements.columns.recognition import CHANNELS, VOCABULARY, ColumnMeaning
+from impactcell.measurements.notation.gains import Gain, parse_gain
+from impactcell.measurements.notation.numbers import parse_number
+from impactcell.measurements.notation.units import Dimension, parse_unit
+from impactcell.measurements.taps.cutting import NO_TRIGGER
 from impactcell.process import yaml_loader
 from impactcell.records.plausible_range import STROKE
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from impactcell.errors import CampaignError
-from impactcell.measurements.natural_order import natural_key
+from impactcell.measurements.notation.natural_order import natural_key
 from impactcell.process.background import VerbOutcome, run_verb
 from impactcell.web.studies.campaign_archive import holds_campaign, unpack_campaign
 from impactcell.web.studies.overview import campaign_overview, friction_overview

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from impactcell.measurements import Given, guess, read_tables
-from impactcell.measurements.mapping import Mapping
-from impactcell.measurements.units import parse_unit
+from impactcell.measurements.columns.mapping import Mapping
+from impactcell.measurements.notation.units import parse_unit
 from impactcell.web.texts.import_faults import page_fault
 
 ROWS = "\n".join(f"{n};{n % 7};{0.5 * n}" for n in range(40))

@@ -9,7 +9,7 @@ import pytest
 from impactcell.campaign import Excitation
 from impactcell.errors import MeasurementError
 from impactcell.measurements import Given, Imported, guess, make_campaign
-from impactcell.measurements.recognition import ColumnMeaning
+from impactcell.measurements.columns.recognition import ColumnMeaning
 from impactcell.web.texts.import_faults import page_fault
 from impactcell.web.texts.import_notes import page_note
 from tests.unit.measurements.records import recorded, sampled, taps

@@ -7,7 +7,7 @@ import pytest
 
 from impactcell.measurements import ColumnMeaning, Dialect, guess, make_campaign, read_tables
 from impactcell.measurements.given import read_given
-from impactcell.measurements.units import parse_unit, split_unit
+from impactcell.measurements.notation.units import parse_unit, split_unit
 from impactcell.web.texts.import_faults import page_fault
 from tests.unit.measurements.records import sampled, taps
 

@@ -24,9 +24,9 @@ from impactcell.measurements import (
     read_tables,
     write_campaign,
 )
+from impactcell.measurements.columns.scalars import said_beside, scalars_of
 from impactcell.measurements.given import read_given
-from impactcell.measurements.scalars import said_beside, scalars_of
-from impactcell.measurements.units import split_unit
+from impactcell.measurements.notation.units import split_unit
 from impactcell.prediction import estimate_from_features
 from impactcell.prediction.joint_plant_fit import fit_plant
 from impactcell.web.texts.import_notes import page_note

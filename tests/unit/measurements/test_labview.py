@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from impactcell.errors import MeasurementError
 from impactcell.measurements import guess, make_campaign, read_tables
-from impactcell.measurements.dialect import Dialect
+from impactcell.measurements.files.dialect import Dialect
 from impactcell.measurements.given import read_given
 
 STEP_S = 1e-3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from impactcell.measurements import guess, read_tables
-from impactcell.measurements.moments import read_moments, unread_moments
+from impactcell.measurements.notation.moments import read_moments, unread_moments
 from impactcell.web.texts.import_faults import page_fault
 
 CLOCK = "10:00:00.{:03d}"

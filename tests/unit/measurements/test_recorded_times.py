@@ -11,7 +11,7 @@ from impactcell.cli.app import run_verb
 from impactcell.errors import MeasurementError
 from impactcell.measurements import ColumnMeaning, guess, read_tables
 from impactcell.measurements.given import read_given
-from impactcell.measurements.recorders import records_of
+from impactcell.measurements.records.recorders import records_of
 from impactcell.web.texts.import_faults import page_fault
 
 COUNT = 60

@@ -6,7 +6,7 @@ import pytest
 from impactcell.campaign import Coordinate, Excitation
 from impactcell.errors import MeasurementError
 from impactcell.measurements import Given, guess, make_campaign
-from impactcell.measurements.recognition import ColumnMeaning
+from impactcell.measurements.columns.recognition import ColumnMeaning
 from impactcell.measurements.table import MeasuredColumn, Table
 
 TIME_S = np.arange(2000) * 1e-3

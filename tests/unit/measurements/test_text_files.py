@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from impactcell.errors import MeasurementError
 from impactcell.measurements import Dialect, Limits, Table, read_tables
+from impactcell.measurements.columns.sampling_step import sampling_step_s
 from impactcell.measurements.given import read_given
-from impactcell.measurements.sampling_step import sampling_step_s
 
 DIALECTS = [(";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), ("|", ","), (" ", "."), (" ", ",")]
 HEADERS = [("Time", "Force", "Position"), ("Zeit", "Kraft", "Weg"), ("Größe t", "Schlag µ", "x°")]

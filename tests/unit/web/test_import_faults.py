@@ -7,8 +7,8 @@ import pytest
 
 from impactcell.errors import MeasurementError
 from impactcell.measurements import Given, Table, guess, make_campaign, read_tables
-from impactcell.measurements.excitation import SWAPPED
 from impactcell.measurements.given import read_given
+from impactcell.measurements.taps.excitation import SWAPPED
 from impactcell.web.texts.import_faults import page_fault
 from impactcell.web.texts.import_notes import page_note
 
