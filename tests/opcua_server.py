@@ -13,7 +13,7 @@ from asyncua.crypto import security_policies
 
 from impactcell.alarms import AlarmEvent, EventKind, Message
 from impactcell.alarms.lifecycle import transition
-from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
+from impactcell.opcua.certificates.making import make_certificate, own_hosts, write_pair
 from impactcell.records import Alarm, Evidence, Quality, Snapshot
 from impactcell.scada import (
     Actor,

@@ -10,12 +10,12 @@ from cryptography import x509
 
 from impactcell.cli.paths import check_directory, check_output, kind_of
 from impactcell.errors import AccessError
-from impactcell.opcua.certificate_dates import validity_mark
-from impactcell.opcua.certificate_files import der, fingerprint, read_certificate, thumbprint
-from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
+from impactcell.opcua.certificates.certificate_dates import validity_mark
+from impactcell.opcua.certificates.certificate_files import der, fingerprint, read_certificate, thumbprint
+from impactcell.opcua.certificates.making import make_certificate, own_hosts, write_pair
+from impactcell.opcua.certificates.own_certificate import KEY
+from impactcell.opcua.certificates.trust_list import FOLDERS, is_revocation_list, make_folders
 from impactcell.opcua.host_interface import Role
-from impactcell.opcua.own_certificate import KEY
-from impactcell.opcua.trust_list import FOLDERS, is_revocation_list, make_folders
 from impactcell.process.console import print_result
 from impactcell.process.path_kind import Kind
 from impactcell.scada.interface import default_application_uri

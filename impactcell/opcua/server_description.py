@@ -7,8 +7,8 @@ from asyncua import ua
 
 from impactcell.opcua.binary_codec import MAX_OPERATIONS
 from impactcell.opcua.continuation_points import MAX_BROWSE_POINTS, MAX_HISTORY_POINTS
-from impactcell.opcua.historical_variable import BEGINNING, VALUES_PER_PAGE
-from impactcell.opcua.history_service import MAX_NODES_PER_READ
+from impactcell.opcua.history.historical_variable import BEGINNING, VALUES_PER_PAGE
+from impactcell.opcua.history.history_service import MAX_NODES_PER_READ
 from impactcell.opcua.host_interface import Product, ServerSettings
 
 

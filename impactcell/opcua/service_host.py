@@ -11,28 +11,28 @@ from urllib.parse import urlsplit
 from asyncua import ua
 
 from impactcell.errors import SettingsError
+from impactcell.opcua.address_space.variable_store import VariableStore
 from impactcell.opcua.asyncua_adapter import AddressSpace, SecurityPolicyFactory, bound_null_arrays
-from impactcell.opcua.attribute_service import AttributeService
-from impactcell.opcua.authentication import Authenticator
 from impactcell.opcua.binary_codec import StatusCodeError
-from impactcell.opcua.connection_table import ConnectionTable
-from impactcell.opcua.discovery_service import POLICIES, DiscoveryService
-from impactcell.opcua.history_processed import AGGREGATE_FUNCTIONS
-from impactcell.opcua.history_service import HistoryService
+from impactcell.opcua.certificates.trust_list import TrustList
+from impactcell.opcua.history.history_processed import AGGREGATE_FUNCTIONS
+from impactcell.opcua.history.history_service import HistoryService
 from impactcell.opcua.host_interface import Actor, Host, RefusedError, ServerSettings
 from impactcell.opcua.languages import Languages
-from impactcell.opcua.method_service import MethodService
-from impactcell.opcua.monitored_item_service import MonitoredItemService
-from impactcell.opcua.request_dispatch import RequestDispatcher, Service
-from impactcell.opcua.secure_channel import ChannelSecurity
 from impactcell.opcua.server_description import build_info, server_description
+from impactcell.opcua.services.attribute_service import AttributeService
+from impactcell.opcua.services.discovery_service import POLICIES, DiscoveryService
+from impactcell.opcua.services.method_service import MethodService
+from impactcell.opcua.services.view_service import ViewService
 from impactcell.opcua.session_service import SessionService
-from impactcell.opcua.session_table import SessionTable
-from impactcell.opcua.subscription_service import SubscriptionService
-from impactcell.opcua.tcp_connection import TcpConnection
-from impactcell.opcua.trust_list import TrustList
-from impactcell.opcua.variable_store import VariableStore
-from impactcell.opcua.view_service import ViewService
+from impactcell.opcua.sessions.authentication import Authenticator
+from impactcell.opcua.sessions.request_dispatch import RequestDispatcher, Service
+from impactcell.opcua.sessions.session_table import SessionTable
+from impactcell.opcua.subscriptions.monitored_item_service import MonitoredItemService
+from impactcell.opcua.subscriptions.subscription_service import SubscriptionService
+from impactcell.opcua.transport.connection_table import ConnectionTable
+from impactcell.opcua.transport.secure_channel import ChannelSecurity
+from impactcell.opcua.transport.tcp_connection import TcpConnection
 
 _log = logging.getLogger(__name__)
 

@@ -11,16 +11,16 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import INVALID_SIGNATURE, StrictBuffer
-from impactcell.opcua.authentication import Authenticator, ClientApplication
 from impactcell.opcua.binary_codec import StatusCodeError
-from impactcell.opcua.certificate_files import application_uris
-from impactcell.opcua.discovery_service import DiscoveryService
+from impactcell.opcua.certificates.certificate_files import application_uris
+from impactcell.opcua.certificates.trust_list import TrustList
 from impactcell.opcua.host_interface import ServerLimits
 from impactcell.opcua.languages import Languages
-from impactcell.opcua.request_dispatch import RequestContext, Service
-from impactcell.opcua.session_table import Session, SessionTable
-from impactcell.opcua.subscription_service import SubscriptionService
-from impactcell.opcua.trust_list import TrustList
+from impactcell.opcua.services.discovery_service import DiscoveryService
+from impactcell.opcua.sessions.authentication import Authenticator, ClientApplication
+from impactcell.opcua.sessions.request_dispatch import RequestContext, Service
+from impactcell.opcua.sessions.session_table import Session, SessionTable
+from impactcell.opcua.subscriptions.subscription_service import SubscriptionService
 
 _log = logging.getLogger(__name__)
 

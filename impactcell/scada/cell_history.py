@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from asyncua import ua
 
+from impactcell.opcua.address_space.variable_store import RASTER_NS
 from impactcell.opcua.event_notification import EventNotification
 from impactcell.opcua.host_interface import (
     HistoricalEvents,
@@ -12,7 +13,6 @@ from impactcell.opcua.host_interface import (
     HistoricalValues,
     HistoryRequest,
 )
-from impactcell.opcua.variable_store import RASTER_NS
 from impactcell.records import Alarm, Quality
 from impactcell.scada.interface import HistorySource
 from impactcell.scada.publishing import STATUS

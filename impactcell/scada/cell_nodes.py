@@ -9,10 +9,16 @@ from asyncua import ua
 
 from impactcell.alarms import RULES
 from impactcell.errors import SettingsError
+from impactcell.opcua.address_space.node_references import (
+    HAS_TYPE_DEFINITION,
+    link,
+    read_attribute,
+    set_attribute,
+    targets,
+)
+from impactcell.opcua.address_space.type_instances import instantiate
 from impactcell.opcua.asyncua_adapter import AddressSpace, StandardServer, address_space, compute_attribute
 from impactcell.opcua.languages import TranslatedText
-from impactcell.opcua.node_references import HAS_TYPE_DEFINITION, link, read_attribute, set_attribute, targets
-from impactcell.opcua.type_instances import instantiate
 from impactcell.quantities import CYCLE, HISTORY
 from impactcell.scada.interface import CellDescription, Machine
 from impactcell.scada.standard_descriptions import DESCRIPTIONS

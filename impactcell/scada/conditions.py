@@ -13,10 +13,10 @@ from typing import Any, Final
 from asyncua import ua
 
 from impactcell.alarms import RULES, is_retained
+from impactcell.opcua.address_space.variable_store import GOOD, NOT_ENCODABLE, VariableStore, moment
 from impactcell.opcua.binary_codec import encoding_fault
 from impactcell.opcua.event_notification import BrowsePath, EventNotification
 from impactcell.opcua.languages import TranslatedText
-from impactcell.opcua.variable_store import GOOD, NOT_ENCODABLE, VariableStore, moment
 from impactcell.records import Alarm, Shelving
 from impactcell.scada.alarm_events import activation_id, event_id
 from impactcell.scada.cell_nodes import CellSpace

@@ -9,9 +9,14 @@ from asyncua import ua
 from impactcell.alarms import EventKind
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.event_notification import EventNotification
-from impactcell.opcua.method_service import InputArgument, InvalidArgumentError, Method, MethodService
-from impactcell.opcua.request_dispatch import RequestContext
-from impactcell.opcua.subscription_service import SubscriptionService
+from impactcell.opcua.services.method_service import (
+    InputArgument,
+    InvalidArgumentError,
+    Method,
+    MethodService,
+)
+from impactcell.opcua.sessions.request_dispatch import RequestContext
+from impactcell.opcua.subscriptions.subscription_service import SubscriptionService
 from impactcell.quantities import BY_PATH, MILLIMETRE
 from impactcell.scada.access_policy import CellAccess
 from impactcell.scada.audit_log import MethodAudit

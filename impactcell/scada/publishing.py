@@ -6,8 +6,8 @@ from typing import Final
 
 from asyncua import ua
 
-from impactcell.opcua.node_references import read_attribute
-from impactcell.opcua.variable_store import GOOD, StoredVariable, VariableStore, moment
+from impactcell.opcua.address_space.node_references import read_attribute
+from impactcell.opcua.address_space.variable_store import GOOD, StoredVariable, VariableStore, moment
 from impactcell.quantities import BY_PATH, CYCLE, MODULE, POSITIONING
 from impactcell.records import ModuleStatus, Quality, Snapshot
 from impactcell.records.quantity import Quantity, Value

@@ -14,12 +14,12 @@ from asyncua import ua
 
 from impactcell import __version__
 from impactcell.alarms import RULES, EventKind
+from impactcell.opcua.address_space.node_references import link
+from impactcell.opcua.address_space.variable_store import VariableStore
 from impactcell.opcua.asyncua_adapter import AddressSpace, address_space, new_standard_server
 from impactcell.opcua.event_notification import EventNotification
 from impactcell.opcua.host_interface import Actor, Host, Permission, Product, RefusedError, ServerSettings
-from impactcell.opcua.node_references import link
 from impactcell.opcua.service_host import ServiceHost, aggregate_functions
-from impactcell.opcua.variable_store import VariableStore
 from impactcell.process.stopping import whole
 from impactcell.quantities import HISTORY
 from impactcell.records import Alarm, ModuleStatus, Snapshot

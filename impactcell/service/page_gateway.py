@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final, TypeVar
 
 from impactcell.errors import AccessError
-from impactcell.opcua.certificate_files import der, read_certificate, thumbprint
+from impactcell.opcua.certificates.certificate_files import der, read_certificate, thumbprint
 from impactcell.process.background import run_verb
 from impactcell.scada import Actor, ConditionAction, RefusedError, Server
 from impactcell.scada.audit_log import audited

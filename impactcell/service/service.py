@@ -15,7 +15,7 @@ from impactcell.alarms.rules import journal_fault
 from impactcell.errors import ForeignJournalError, JournalError, UnstoredError
 from impactcell.fieldbus.transports import Transports
 from impactcell.numerics.compilation import COMPILING, on_compilation
-from impactcell.opcua.large_requests import leave_full_rounds_to_the_server
+from impactcell.opcua.sessions.large_requests import leave_full_rounds_to_the_server
 from impactcell.process import log_lines, systemd
 from impactcell.process.cell_logger import CellLogger
 from impactcell.process.signals import stop_on_signals

@@ -4,7 +4,7 @@ import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
-from impactcell.opcua.own_certificate import KEY
+from impactcell.opcua.certificates.own_certificate import KEY
 from impactcell.process.file_access import what_others_can
 from impactcell.settings.remark import Remark
 from impactcell.settings.sections import CellSettings

@@ -12,9 +12,9 @@ from cryptography import x509
 
 from impactcell.errors import AccessError
 from impactcell.journal.refusal import refusal
-from impactcell.opcua.certificate_dates import ANOTHER_FOR_THE_PAGE, validity_doubt
-from impactcell.opcua.certificate_files import read_certificate
-from impactcell.opcua.own_certificate import (
+from impactcell.opcua.certificates.certificate_dates import ANOTHER_FOR_THE_PAGE, validity_doubt
+from impactcell.opcua.certificates.certificate_files import read_certificate
+from impactcell.opcua.certificates.own_certificate import (
     CERTIFICATE,
     KEY,
     made_anew,

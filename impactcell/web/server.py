@@ -15,8 +15,8 @@ from urllib.parse import urlsplit
 import uvicorn
 
 from impactcell.errors import AccessError, SettingsError
-from impactcell.opcua.certificate_dates import ANOTHER_FOR_THE_PAGE, CertificateWatch
-from impactcell.opcua.certificate_files import read_certificate
+from impactcell.opcua.certificates.certificate_dates import ANOTHER_FOR_THE_PAGE, CertificateWatch
+from impactcell.opcua.certificates.certificate_files import read_certificate
 from impactcell.process.tls_pair import pair_fault
 from impactcell.scada.users import Users
 from impactcell.web.app import page_app

@@ -11,7 +11,7 @@ from starlette.responses import RedirectResponse, Response
 
 from impactcell.alarms.rules import journal_fault
 from impactcell.errors import AccessError
-from impactcell.opcua.certificate_files import der, read_certificate, thumbprint
+from impactcell.opcua.certificates.certificate_files import der, read_certificate, thumbprint
 from impactcell.process.file_access import what_others_can
 from impactcell.records import Alarm, ModuleStatus
 from impactcell.scada import RefusedError, Role

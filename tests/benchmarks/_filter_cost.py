@@ -5,10 +5,10 @@ import time
 from asyncua import ua
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
-from impactcell.opcua.content_filter import MAX_ELEMENTS
-from impactcell.opcua.event_filter import EventFilter
 from impactcell.opcua.event_notification import EventNotification
-from impactcell.opcua.like_pattern import MAX_PATTERN
+from impactcell.opcua.filters.content_filter import MAX_ELEMENTS
+from impactcell.opcua.filters.event_filter import EventFilter
+from impactcell.opcua.filters.like_pattern import MAX_PATTERN
 from tests.benchmarks.table import Table
 
 SIZES = (5, 19, 50, MAX_ELEMENTS)

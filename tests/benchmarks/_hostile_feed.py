@@ -17,7 +17,7 @@ import numpy as np
 import psutil
 
 from impactcell.journal.store import Journal
-from impactcell.opcua.large_requests import leave_full_rounds_to_the_server
+from impactcell.opcua.sessions.large_requests import leave_full_rounds_to_the_server
 from impactcell.service.history_source import JournalHistory
 from tests.benchmarks._opcua_feed import cycle
 from tests.opcua_server import PASSWORDS, START_NS, Site, site

@@ -22,7 +22,7 @@ from asyncua import Client, ua
 from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
 from prometheus_client.parser import text_string_to_metric_families
 
-from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
+from impactcell.opcua.certificates.making import make_certificate, own_hosts, write_pair
 from impactcell.scada import Role
 from impactcell.scada.users import User, with_password, write_users
 from impactcell.tracking.wear_batch.settings import TrackerSettings

@@ -62,7 +62,11 @@ ROOMS: Final[dict[str, tuple[tuple[str, ...], tuple[str, ...]]]] = {
         ("tests/discrepancy",),
     ),
     "scada access": (
-        ("impactcell/scada/users.py", "impactcell/opcua/trust_list.py", "impactcell/opcua/secure_channel.py"),
+        (
+            "impactcell/scada/users.py",
+            "impactcell/opcua/certificates/trust_list.py",
+            "impactcell/opcua/transport/secure_channel.py",
+        ),
         (
             "tests/unit/opcua",
             "tests/integration/test_opcua_identity.py",

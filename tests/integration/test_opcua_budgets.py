@@ -14,9 +14,9 @@ import pytest_asyncio
 from asyncua import Client, ua
 from asyncua.ua.ua_binary import struct_to_binary
 
-from impactcell.opcua.large_requests import LARGE_BYTES
-from impactcell.opcua.tcp_connection import TcpConnection
-from impactcell.opcua.view_service import MAX_BROWSE_POINTS
+from impactcell.opcua.services.view_service import MAX_BROWSE_POINTS
+from impactcell.opcua.sessions.large_requests import LARGE_BYTES
+from impactcell.opcua.transport.tcp_connection import TcpConnection
 from impactcell.scada import ServerLimits, ValuePage
 from impactcell.scada.users import Users
 from tests.opcua_server import PASSWORDS, Site, site
@@ -120,7 +120,9 @@ async def test_a_long_message_is_for_those_who_have_logged_in(here: Site) -> Non
 async def test_an_address_that_holds_too_many_unfinished_bytes(
     here: Site, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("impactcell.opcua.connection_table.MAX_UNFINISHED_BYTES_PER_ADDRESS", 100_000)
+    monkeypatch.setattr(
+        "impactcell.opcua.transport.connection_table.MAX_UNFINISHED_BYTES_PER_ADDRESS", 100_000
+    )
     async with contextlib.AsyncExitStack() as stack:
         wires = [await stack.enter_async_context(raw(here)) for _ in range(3)]
         for wire in wires:
@@ -244,7 +246,7 @@ async def test_an_answer_to_browse_has_room_for_so_many_references(
     here: Site, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The rest comes by continuation points, and those that an answer gives hold until they are used."""
-    monkeypatch.setattr("impactcell.opcua.view_service.MAX_REFERENCES_PER_ANSWER", 20)
+    monkeypatch.setattr("impactcell.opcua.services.view_service.MAX_REFERENCES_PER_ANSWER", 20)
     async with await here.client() as client:
         cell = (await here.node(client, "")).nodeid
         whole = (await browse(client, [cell]))[0]
@@ -306,7 +308,7 @@ async def test_event_items_are_bounded_for_a_user(here: Site) -> None:
 async def test_queues_of_a_subscription_are_bounded_together(
     here: Site, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("impactcell.opcua.subscription.QUEUED_VALUES", 25)
+    monkeypatch.setattr("impactcell.opcua.subscriptions.subscription.QUEUED_VALUES", 25)
     async with await here.client("engineer") as client:
         subscription = await client.create_subscription(1000.0, _Silent())
         parameters = ua.CreateMonitoredItemsParameters()

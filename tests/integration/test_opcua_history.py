@@ -11,9 +11,9 @@ import pytest
 from asyncua import Client, ua
 from asyncua.ua import ua_binary
 
-from impactcell.opcua.historical_variable import VALUES_PER_PAGE
+from impactcell.opcua.history.historical_variable import VALUES_PER_PAGE
+from impactcell.opcua.history.read_budget import VALUES_PER_ANSWER
 from impactcell.opcua.loop_share import SLICE_S
-from impactcell.opcua.read_budget import VALUES_PER_ANSWER
 from impactcell.quantities import HISTORY
 from impactcell.records import Alarm
 from impactcell.scada import HistoryRequest, HistoryValue, ValuePage
@@ -175,7 +175,7 @@ async def test_aggregates_of_many_nodes_come_page_by_page_while_others_are_answe
     # By this clock a turn is over after so many pieces, however quick the machine is.
     clock = SimpleNamespace(perf_counter=itertools.count(0.0, SLICE_S / PIECES).__next__)
     monkeypatch.setattr("impactcell.opcua.loop_share.time", clock)
-    monkeypatch.setattr("impactcell.opcua.read_budget.LONGEST_S", math.inf)
+    monkeypatch.setattr("impactcell.opcua.history.read_budget.LONGEST_S", math.inf)
     read, longest = 0, 0
 
     async def values(cell: str, variable: str, request: HistoryRequest) -> ValuePage:
@@ -235,7 +235,7 @@ async def all_of(client: Client, nodes: list[ua.HistoryReadValueId]) -> tuple[li
 
 
 async def test_an_answer_ends_when_its_time_is_over(here: Site, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("impactcell.opcua.read_budget.LONGEST_S", 0.0)
+    monkeypatch.setattr("impactcell.opcua.history.read_budget.LONGEST_S", 0.0)
     monkeypatch.setattr(here.history, "values", one_by_one(here))
     async with await here.client() as client:
         assert await answers(here, client, VARIABLE, raw(3, 6, 0)) == [[3], [4], [5]]

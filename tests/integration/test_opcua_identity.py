@@ -14,8 +14,8 @@ from asyncua.crypto import security_policies, uacrypto
 from asyncua.ua.ua_binary import struct_from_binary
 from cryptography.hazmat.primitives.asymmetric import rsa
 
-from impactcell.opcua.certificate_files import der, fingerprint
-from impactcell.opcua.certificates import make_certificate
+from impactcell.opcua.certificates.certificate_files import der, fingerprint
+from impactcell.opcua.certificates.making import make_certificate
 from impactcell.scada import Role, SecurityPolicy
 from impactcell.scada.users import User, read_users, write_users
 from tests.opcua_server import CLIENT_URI, PASSWORDS, PatientClient, Site, site

@@ -10,8 +10,8 @@ from collections.abc import AsyncIterator
 
 import pytest
 
-from impactcell.opcua.connection_table import MAX_UNFINISHED_BYTES_PER_ADDRESS
-from impactcell.opcua.tcp_connection import MAX_QUEUED_BYTES
+from impactcell.opcua.transport.connection_table import MAX_UNFINISHED_BYTES_PER_ADDRESS
+from impactcell.opcua.transport.tcp_connection import MAX_QUEUED_BYTES
 from tests.integration.processes import ROOT
 from tests.opcua_wire import Raw, frame
 

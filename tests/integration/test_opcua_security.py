@@ -15,7 +15,7 @@ from asyncua.crypto import uacrypto
 from cryptography.hazmat.primitives.serialization import Encoding
 
 from impactcell.errors import AccessError
-from impactcell.opcua import login_throttle
+from impactcell.opcua.sessions import login_throttle
 from impactcell.scada import Role, SecurityPolicy, ServerLimits
 from impactcell.scada.users import User, read_users, verify, with_password, write_users
 from tests.certificates import self_signed
@@ -325,8 +325,8 @@ async def test_start_without_what_is_needed(tmp_path) -> None:
 
 
 async def test_user_certificate() -> None:
-    from impactcell.opcua.certificate_files import der, fingerprint
-    from impactcell.opcua.certificates import make_certificate, write_pair
+    from impactcell.opcua.certificates.certificate_files import der, fingerprint
+    from impactcell.opcua.certificates.making import make_certificate, write_pair
 
     async with site() as here:
         certificate, key = make_certificate("person", "urn:test:person", ["localhost"])

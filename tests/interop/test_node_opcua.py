@@ -17,8 +17,8 @@ from cryptography import x509
 from cryptography.hazmat.primitives import serialization
 
 from impactcell.alarms import NAMES, AlarmEvent, EventKind, Message
-from impactcell.opcua.certificate_files import fingerprint
-from impactcell.opcua.certificates import make_certificate, own_hosts, write_pair
+from impactcell.opcua.certificates.certificate_files import fingerprint
+from impactcell.opcua.certificates.making import make_certificate, own_hosts, write_pair
 from impactcell.records import Alarm
 from impactcell.scada import HistoryValue, Role
 from impactcell.scada.users import User, read_users, write_users

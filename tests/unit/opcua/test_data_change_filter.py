@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from impactcell.opcua.asyncua_adapter import StrictBuffer, bound_null_arrays
 from impactcell.opcua.binary_codec import DecodingError, StatusCodeError, decode
-from impactcell.opcua.data_change_filter import DataChangeFilter, cut, parse_range, same
-from impactcell.opcua.like_pattern import like
+from impactcell.opcua.filters.data_change_filter import DataChangeFilter, cut, parse_range, same
+from impactcell.opcua.filters.like_pattern import like
 
 TRIGGER = ua.DataChangeTrigger
 

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from impactcell.opcua.asyncua_adapter import AddressSpace
 from impactcell.opcua.binary_codec import StatusCodeError
-from impactcell.opcua.event_filter import EventFilter
 from impactcell.opcua.event_notification import EventNotification
-from impactcell.opcua.like_pattern import LikePattern, like
+from impactcell.opcua.filters.event_filter import EventFilter
+from impactcell.opcua.filters.like_pattern import LikePattern, like
 
 Operator = ua.FilterOperator
 

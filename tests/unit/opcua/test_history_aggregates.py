@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from impactcell.opcua.history_aggregates import (
+from impactcell.opcua.history.history_aggregates import (
     BAD,
     CALCULATED,
     MULTIPLE,
@@ -20,7 +20,7 @@ from impactcell.opcua.history_aggregates import (
     ProcessingInterval,
     processing_intervals,
 )
-from impactcell.opcua.history_aggregates import AggregateFunction as Function
+from impactcell.opcua.history.history_aggregates import AggregateFunction as Function
 from impactcell.opcua.host_interface import HistoricalValue
 
 G, U, B = 0x0000_0000, 0x4000_0000, 0x8000_0000  # Good, Uncertain, Bad (Part 4, 7.39)

@@ -11,14 +11,14 @@ import psutil
 import pytest
 
 from impactcell.opcua.fan_out import AT_ONCE, FanOut
-from impactcell.opcua.large_requests import (
+from impactcell.opcua.loop_share import SLICE_S, LoopShare, Turns
+from impactcell.opcua.sessions.large_requests import (
     LARGE_BYTES,
     NEVER,
     LargeRequests,
     give_back_memory,
     leave_full_rounds_to_the_server,
 )
-from impactcell.opcua.loop_share import SLICE_S, LoopShare, Turns
 
 PIECES = 10
 
@@ -187,8 +187,8 @@ async def until(holds: Callable[[], bool]) -> None:
 
 async def test_garbage_is_looked_for_between_long_requests(monkeypatch: pytest.MonkeyPatch) -> None:
     line, rounds = LargeRequests(), list[int]()
-    monkeypatch.setattr("impactcell.opcua.large_requests.COLLECT_EVERY_S", 0.0)
-    monkeypatch.setattr("impactcell.opcua.large_requests.gc.collect", lambda: rounds.append(1))
+    monkeypatch.setattr("impactcell.opcua.sessions.large_requests.COLLECT_EVERY_S", 0.0)
+    monkeypatch.setattr("impactcell.opcua.sessions.large_requests.gc.collect", lambda: rounds.append(1))
     async with line.turn(LARGE_BYTES):
         task = asyncio.ensure_future(line.collect_garbage())
         for _ in range(20):

@@ -8,8 +8,8 @@ from asyncua import ua
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.host_interface import ServerLimits
 from impactcell.opcua.languages import Languages
-from impactcell.opcua.session_table import Session
-from impactcell.opcua.subscription_service import SubscriptionService
+from impactcell.opcua.sessions.session_table import Session
+from impactcell.opcua.subscriptions.subscription_service import SubscriptionService
 
 
 async def test_a_publish_request_that_the_move_has_overtaken_is_refused_where_it_came_from() -> None:

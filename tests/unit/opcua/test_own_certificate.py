@@ -11,8 +11,8 @@ from cryptography.hazmat.primitives.serialization import Encoding
 
 from impactcell.cli import access
 from impactcell.errors import AccessError
-from impactcell.opcua.own_certificate import made_anew
-from impactcell.opcua.trust_list import TrustList
+from impactcell.opcua.certificates.own_certificate import made_anew
+from impactcell.opcua.certificates.trust_list import TrustList
 from impactcell.scada import default_application_uri
 from impactcell.settings import read_cell
 from impactcell.settings.judgement import CellFinding, judge_cell

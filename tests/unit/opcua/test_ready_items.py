@@ -3,7 +3,7 @@
 from types import SimpleNamespace
 from typing import Any
 
-from impactcell.opcua.ready_items import ReadyItems
+from impactcell.opcua.subscriptions.ready_items import ReadyItems
 
 
 def ready(*waiting: int) -> ReadyItems:

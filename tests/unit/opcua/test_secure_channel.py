@@ -6,7 +6,7 @@ import struct
 import pytest
 
 from impactcell.opcua.binary_codec import StatusCodeError
-from impactcell.opcua.secure_channel import ChannelSecurity, SecureChannel
+from impactcell.opcua.transport.secure_channel import ChannelSecurity, SecureChannel
 
 SMALLEST = 8_192
 """Smallest buffer that a client may have, bytes (OPC UA Part 6, 7.1.2.3)."""

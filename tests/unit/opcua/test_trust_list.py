@@ -17,9 +17,14 @@ from cryptography.x509.oid import NameOID
 
 from impactcell.cli import access
 from impactcell.errors import AccessError
-from impactcell.opcua.certificate_files import application_uris, der, first_of_chain, parse_certificate
-from impactcell.opcua.certificates import make_certificate
-from impactcell.opcua.trust_list import TrustList, UntrustedError
+from impactcell.opcua.certificates.certificate_files import (
+    application_uris,
+    der,
+    first_of_chain,
+    parse_certificate,
+)
+from impactcell.opcua.certificates.making import make_certificate
+from impactcell.opcua.certificates.trust_list import TrustList, UntrustedError
 from impactcell.scada import Role
 from impactcell.scada.users import User, Users, read_users, verify, with_password, write_users
 
@@ -227,7 +232,7 @@ def test_a_name_in_the_folder_of_rejected_ones_has_80_characters_of_its_subject(
 
 
 def test_rejected_certificates_do_not_pile_up(pki: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("impactcell.opcua.trust_list.MAX_REJECTED", 3)
+    monkeypatch.setattr("impactcell.opcua.certificates.trust_list.MAX_REJECTED", 3)
     trust = TrustList(pki, URI)
     for _ in range(5):
         with pytest.raises(UntrustedError):

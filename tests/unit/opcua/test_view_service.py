@@ -3,11 +3,11 @@
 import pytest
 from asyncua import ua
 
+from impactcell.opcua.address_space.node_references import set_attribute
 from impactcell.opcua.asyncua_adapter import AddressSpace, NodeData
 from impactcell.opcua.binary_codec import StatusCodeError
 from impactcell.opcua.languages import Languages
-from impactcell.opcua.node_references import set_attribute
-from impactcell.opcua.view_service import ViewService
+from impactcell.opcua.services.view_service import ViewService
 
 CHILDREN = 10
 

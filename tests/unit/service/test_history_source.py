@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from impactcell.journal.store import Journal
-from impactcell.opcua.historical_variable import parse_read_range
+from impactcell.opcua.history.historical_variable import parse_read_range
 from impactcell.records import Alarm, Quality
 from impactcell.scada import HistoryRequest, RefusedError
 from impactcell.service.history_source import ALARMS_AT_ONCE, VALUES_AT_ONCE, JournalHistory

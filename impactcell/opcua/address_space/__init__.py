@@ -1,0 +1,1 @@
+"""What the server shows: nodes and their references, values, and objects made from types."""

@@ -1,0 +1,1 @@
+"""Certificates: made, kept in files, trusted, and when they end."""

@@ -1,0 +1,1 @@
+"""Services that need no state of their own: attributes, methods, browsing, discovery."""

@@ -1,0 +1,1 @@
+"""Who asks: sessions, logins, and to whom a request goes."""
