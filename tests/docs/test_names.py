@@ -87,7 +87,7 @@ def test_docstrings_use_no_retired_type() -> None:
 def test_the_table_of_opcua_has_a_row_for_each_module() -> None:
     room = ROOT / "impactcell" / "opcua"
     rows = re.findall(r"^`(\w+)` {2,}", docstrings(room / "__init__.py"), re.MULTILINE)
-    assert sorted(rows) == sorted(path.stem for path in room.glob("*.py") if path.stem != "__init__")
+    assert sorted(rows) == sorted(path.stem for path in room.rglob("*.py") if path.stem != "__init__")
 
 
 def test_a_name_that_is_gone_is_seen() -> None:
