@@ -51,6 +51,11 @@ MESSAGES: Final[Sequence[tuple[str, str | Callable[[re.Match[str]], str]]]] = (
       "weglassen, oder dem Stoß seine eigenen geben")),
     (r"the force at rest goes from (\S+) N to (\S+) N over (\d+) shots: .*",
      r"die Kraft in Ruhe geht von \1 N auf \2 N über \3 Stöße: Sensor tarieren, warm werden lassen"),
+    (r"the force at rest is another one in each shot, by (\S+) N, (\S+) times its noise: .*",
+     (r"die Kraft in Ruhe ist in jedem Stoß eine andere, um \1 N, das \2-fache ihres Rauschens: ihr "
+      "Nullpunkt wandert, es sei denn, das Teil berührt da noch den Antrieb; vor jedem Stoß tarieren, den "
+      "Verstärker ansehen, oder auch vor dem Kontakt aufzeichnen: davon nimmt `impactcell import` den "
+      "Nullpunkt")),
 )  # fmt: skip
 """What is said of a shot: English as a pattern, and German as that is expanded."""
 NOTE: Final = re.compile(

@@ -1,6 +1,5 @@
 """Looks through a campaign for what is wrong with its data, shot by shot and over all shots."""
 
-import math
 from collections import Counter
 from collections.abc import Sequence
 
@@ -9,22 +8,15 @@ import numpy as np
 from impactcell.campaign import Campaign, Excitation
 from impactcell.campaign.contents import CHANNELS
 from impactcell.errors import CampaignError
-from impactcell.numerics.spikes import noise_of
 from impactcell.quality.channel_faults import channel_faults
 from impactcell.quality.copies import copies
 from impactcell.quality.data_fault import DataFault, Fault
 from impactcell.quality.motion_faults import LATE_STEPS, lateness_s, slides
-from impactcell.records import Capture, Samples
+from impactcell.quality.zero_faults import zero_faults
+from impactcell.records import Capture
 
-DRIFT_SHARE = 0.01
-"""Change of the force at rest over a campaign, as a share of its largest force, from which on it is told."""
-DRIFT_STD = 6.0
-"""The same in standard deviations of the scatter about its trend."""
-LOW_SHARE, REST_STD, MIN_REST_SHARE = 0.05, 5.0, 0.2
-"""The force at rest is the median of what is within so many standard deviations of its lowest twentieth, if
-that is a fifth of the record at least: else it has hardly been recorded."""
 MIN_SHOTS = 6
-"""Shots over which a drift or a lateness can be told."""
+"""Shots over which a lateness can be told."""
 UNUSABLE = (Fault.NO_MOTION, Fault.PRESLIDING_ONLY, Fault.CONSTANT)
 """What leaves nothing to be estimated in a shot."""
 
@@ -43,7 +35,7 @@ def inspect_campaign(campaign: Campaign) -> tuple[DataFault, ...]:
     data_faults += _copied(campaign.shots)
     if campaign.excitation is Excitation.TAP:
         data_faults += _late(campaign.shots)
-        data_faults += _drift(campaign.shots)
+        data_faults += zero_faults(campaign.shots)
     return tuple(data_faults)
 
 
@@ -113,35 +105,3 @@ def _late(shots: Sequence[Capture]) -> list[DataFault]:
         f"the clock of that channel before a law is blamed (impactcell import --delay moves it)"
     )
     return [DataFault(Fault.LATE_CHANNEL, which, told)]
-
-
-def _rest_force(force: Samples) -> float:
-    """Force without contact [N]; nan where the record shows hardly any."""
-    low = float(np.quantile(force, LOW_SHARE))
-    near = force[np.abs(force - low) < REST_STD * max(noise_of(force), 1e-12)]
-    return float(np.median(near)) if len(near) >= MIN_REST_SHARE * len(force) else math.nan
-
-
-def _drift(shots: Sequence[Capture]) -> list[DataFault]:
-    forces = [shot.force for shot in shots if shot.force is not None and np.ptp(shot.force.values) > 0.0]
-    if len(forces) < MIN_SHOTS:
-        return []
-    resting = np.array([_rest_force(force.values) for force in forces])
-    forces = [force for force, rest in zip(forces, resting.tolist(), strict=True) if math.isfinite(rest)]
-    resting = resting[np.isfinite(resting)]
-    if len(forces) < MIN_SHOTS:
-        return []
-    largest = float(np.median([force.values.max() for force in forces]))
-    place = np.arange(len(resting), dtype=np.float64)
-    slope, start = np.polyfit(place, resting, 1)
-    scatter = float(np.std(resting - (start + slope * place)))
-    change = float(slope * (len(resting) - 1))
-    error = scatter * math.sqrt(12.0 / len(resting))
-    if abs(change) < max(DRIFT_SHARE * largest, DRIFT_STD * error):
-        return []
-    told = (
-        f"the force at rest goes from {start:.3g} N to {start + change:.3g} N over {len(resting)} shots: "
-        f"tare the sensor, "
-        f"let it warm up"
-    )
-    return [DataFault(Fault.DRIFT, "force", told)]

@@ -85,6 +85,17 @@ def drifting(shot: Capture) -> Capture:
     return force_of(shot, shot.force.values + 1.5 * shot.cycle)
 
 
+def wandering(shot: Capture) -> Capture:
+    assert shot.force is not None
+    return force_of(shot, shot.force.values + np.random.default_rng(shot.cycle).normal(0.0, 2.0))
+
+
+def humming(shot: Capture) -> Capture:
+    assert shot.force is not None
+    phase = np.random.default_rng(shot.cycle).uniform(0.0, 2.0 * np.pi)
+    return force_of(shot, shot.force.values + 2.0 * np.sin(2.0 * np.pi * 50.0 * shot.force.time_s + phase))
+
+
 def late(shot: Capture) -> Capture:
     assert shot.force is not None
     return replace(shot, force=Channel(shot.force.time_s + 5e-4, shot.force.values))
@@ -107,6 +118,10 @@ def test_clean_data_are_clean(shots: tuple[Capture, ...]) -> None:
     assert inspect_campaign(campaign(shots)) == ()
 
 
+def test_hum_is_no_zero_that_wanders(shots: tuple[Capture, ...]) -> None:
+    assert inspect_campaign(changed(shots, humming, None)) == ()
+
+
 @pytest.mark.parametrize(
     ("change", "only", "fault", "told"),
     [
@@ -116,6 +131,7 @@ def test_clean_data_are_clean(shots: tuple[Capture, ...]) -> None:
         (stuck, 3, Fault.DROPOUTS, "for 40 samples from 0.0041 s"),
         (constant, 3, Fault.CONSTANT, "shot 3: the force is constant at 2.5"),
         (drifting, None, Fault.DRIFT, "the force at rest goes from 1."),
+        (wandering, None, Fault.DRIFT, "the force at rest is another one in each shot, by "),
         (late, None, Fault.LATE_CHANNEL, "the force is recorded 0.5 ms after the position"),
         (resting, 3, Fault.NO_MOTION, "shot 3: the part does not move"),
         (springing, 3, Fault.PRESLIDING_ONLY, "shot 3: the part never slides: it moves by 0.0002"),
