@@ -11,6 +11,7 @@ import pytest
 from impactcell.campaign import Campaign, Excitation
 from impactcell.errors import CampaignError
 from impactcell.features import white_noise_std
+from impactcell.german.data_faults import german_data_fault
 from impactcell.numerics.spikes import noise_of
 from impactcell.quality import Fault, inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Channel
@@ -145,6 +146,7 @@ def test_each_fault_is_found_and_told(
     (note,) = notes_of(data_faults)
     assert note.startswith(f"Data, {fault}: ")
     assert told in note
+    assert (german_data_fault(note) or "").startswith("Daten, ")
 
 
 @pytest.mark.parametrize(
