@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from impactcell.fieldbus.decoding import capture_from_words, sample_counts
+from impactcell.fieldbus.cycles.decoding import capture_from_words, sample_counts
 from impactcell.fieldbus.registers import RegisterMap, registers_crc32
 from impactcell.records import Capture
 from simulator.device import Device, Truth

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ModuleStatus
+from impactcell.fieldbus.cycles.status_block import PositioningStatus, StatusBlock
 from impactcell.fieldbus.modbus_client import ModbusClient
-from impactcell.fieldbus.status_block import PositioningStatus, StatusBlock
 from impactcell.fieldbus.tap_commands import Objection, ObjectionError, TapCommand
 from impactcell.fieldbus.transports import transport_for
 from impactcell.journal.retention import Retention

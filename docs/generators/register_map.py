@@ -6,13 +6,13 @@ from typing import Any
 import yaml
 
 from generators.markdown import code, table
+from impactcell.fieldbus.cycles.status_block import _BATCH
 from impactcell.fieldbus.map_promises import not_promised
-from impactcell.fieldbus.map_registers import CONSTANTS, MEASURED, NEEDED_BY, REQUIRED
-from impactcell.fieldbus.map_validation import _KEYS
 from impactcell.fieldbus.positioning_registers import COMMAND, SHOWN
-from impactcell.fieldbus.register_types import KINDS, SI_FACTOR
+from impactcell.fieldbus.register_map.map_registers import CONSTANTS, MEASURED, NEEDED_BY, REQUIRED
+from impactcell.fieldbus.register_map.map_validation import _KEYS
+from impactcell.fieldbus.register_map.register_types import KINDS, SI_FACTOR
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.fieldbus.status_block import _BATCH
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ROOT / "config" / "maps" / "fpga-v1.yaml"

@@ -19,7 +19,7 @@ from impactcell.errors import (
 )
 from impactcell.features import extract, impulse_balance
 from impactcell.fieldbus.acquisition import ModuleAcquisition
-from impactcell.fieldbus.cycle_dates import clock_ahead, seconds_ahead
+from impactcell.fieldbus.cycles.cycle_dates import clock_ahead, seconds_ahead
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.probe import ProbeResult

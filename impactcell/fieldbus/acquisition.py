@@ -13,25 +13,25 @@ from dataclasses import replace
 from typing import Self
 
 from impactcell.errors import FieldbusError, LinkError
-from impactcell.fieldbus.acknowledgement import Acknowledgement
-from impactcell.fieldbus.backoff import Backoff
-from impactcell.fieldbus.capture_reader import CaptureReader
-from impactcell.fieldbus.capture_ring import cycles_after
-from impactcell.fieldbus.cycle_choice import CycleChoice
-from impactcell.fieldbus.cycle_dates import CycleDates
-from impactcell.fieldbus.cycle_numbers import CycleNumbers
-from impactcell.fieldbus.fetched_capture import NotFetched
-from impactcell.fieldbus.identity import IdentityCheck
-from impactcell.fieldbus.life_check import LifeCheck
+from impactcell.fieldbus.cycles.acknowledgement import Acknowledgement
+from impactcell.fieldbus.cycles.backoff import Backoff
+from impactcell.fieldbus.cycles.capture_reader import CaptureReader
+from impactcell.fieldbus.cycles.capture_ring import cycles_after
+from impactcell.fieldbus.cycles.cycle_choice import CycleChoice
+from impactcell.fieldbus.cycles.cycle_dates import CycleDates
+from impactcell.fieldbus.cycles.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.cycles.fetched_capture import NotFetched
+from impactcell.fieldbus.cycles.identity import IdentityCheck
+from impactcell.fieldbus.cycles.life_check import LifeCheck
+from impactcell.fieldbus.cycles.module_account import ModuleAccount
+from impactcell.fieldbus.cycles.poll_schedule import PollSchedule
+from impactcell.fieldbus.cycles.received_cycle import ReceivedCycle
+from impactcell.fieldbus.cycles.status_block import StatusBlock
+from impactcell.fieldbus.cycles.status_reader import StatusReader
+from impactcell.fieldbus.cycles.taken_cycles import NOTHING_BEFORE, TakenBefore, TakenCycles
 from impactcell.fieldbus.modbus_client import ModbusClient
-from impactcell.fieldbus.module_account import ModuleAccount
-from impactcell.fieldbus.poll_schedule import PollSchedule
-from impactcell.fieldbus.received_cycle import ReceivedCycle
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.fieldbus.status_block import StatusBlock
-from impactcell.fieldbus.status_reader import StatusReader
-from impactcell.fieldbus.taken_cycles import NOTHING_BEFORE, TakenBefore, TakenCycles
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import CycleId, ModuleStatus
 

@@ -29,7 +29,7 @@ from pymodbus.pdu.register_message import (
 )
 
 from impactcell.errors import ModbusExceptionError, ProtocolError
-from impactcell.fieldbus.register_types import BIT_TABLES
+from impactcell.fieldbus.register_map.register_types import BIT_TABLES
 from impactcell.fieldbus.registers import Words
 
 MAX_READ: Final = 125

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Final
 
-from impactcell.fieldbus.register_types import SI_FACTOR
+from impactcell.fieldbus.register_map.register_types import SI_FACTOR
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.records import MM_PER_MIN
 

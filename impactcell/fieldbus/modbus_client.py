@@ -5,7 +5,7 @@ from typing import Final
 from impactcell.errors import LinkError, ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.codec import Request, mask_write_request, read_write_request, write_request
 from impactcell.fieldbus.device_identification import OBJECTS, identification_objects, identification_request
-from impactcell.fieldbus.register_types import BIT_TABLES
+from impactcell.fieldbus.register_map.register_types import BIT_TABLES
 from impactcell.fieldbus.registers import Words
 from impactcell.fieldbus.request_batching import Exchange, PartialBlock, ReplyData, RequestBatch
 from impactcell.fieldbus.transports.protocol import Transport

@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from impactcell.fieldbus.map_registers import SHOWN
-from impactcell.fieldbus.register_types import code_range
+from impactcell.fieldbus.register_map.map_registers import SHOWN
+from impactcell.fieldbus.register_map.register_types import code_range
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.numerics.raster import ANY_VALUE, NEARLY_EQUAL, Raster
 

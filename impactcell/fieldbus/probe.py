@@ -7,12 +7,12 @@ from typing import Final
 
 from impactcell.errors import FieldbusError, LinkError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
-from impactcell.fieldbus.capture_reader import CaptureReader
-from impactcell.fieldbus.capture_ring import NextCapture
-from impactcell.fieldbus.fetched_capture import NotFetched
+from impactcell.fieldbus.cycles.capture_reader import CaptureReader
+from impactcell.fieldbus.cycles.capture_ring import NextCapture
+from impactcell.fieldbus.cycles.fetched_capture import NotFetched
+from impactcell.fieldbus.cycles.status_block import StatusBlock
+from impactcell.fieldbus.cycles.taken_cycles import TakenCycles
 from impactcell.fieldbus.registers import Value
-from impactcell.fieldbus.status_block import StatusBlock
-from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.records import Capture, CycleId
 
 IDENTITY: Final = ("module_name", "serial_number", "map_version", "firmware_version")

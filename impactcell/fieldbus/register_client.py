@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike
 
 from impactcell.errors import ModbusExceptionError, ProtocolError
 from impactcell.fieldbus.codec import MAX_WRITE
-from impactcell.fieldbus.map_validation import READ_WRITE
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.register_image import RegisterBlock, RegisterImage, decoded_image, group_registers
+from impactcell.fieldbus.register_map.map_validation import READ_WRITE
 from impactcell.fieldbus.registers import Register, RegisterMap, Words
 from impactcell.fieldbus.request_batching import PartialBlock
 

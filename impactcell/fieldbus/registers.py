@@ -12,11 +12,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from impactcell.errors import MapError
-from impactcell.fieldbus.map_layout import REGISTER_SPACE, layout_faults, window_faults
-from impactcell.fieldbus.map_registers import ARRAYS, HEADER, REQUIRED, missing_registers
-from impactcell.fieldbus.map_validation import validate_map
-from impactcell.fieldbus.register import Register, Value, Words
-from impactcell.fieldbus.register_types import WIRE
+from impactcell.fieldbus.register_map.map_layout import REGISTER_SPACE, layout_faults, window_faults
+from impactcell.fieldbus.register_map.map_registers import ARRAYS, HEADER, REQUIRED, missing_registers
+from impactcell.fieldbus.register_map.map_validation import validate_map
+from impactcell.fieldbus.register_map.register import Register, Value, Words
+from impactcell.fieldbus.register_map.register_types import WIRE
 from impactcell.process.file_format import newer_file
 
 __all__ = [

@@ -14,7 +14,7 @@ import numpy as np
 
 from impactcell.errors import FieldbusError
 from impactcell.fieldbus.codec import FunctionCode, Request, read_request
-from impactcell.fieldbus.register_types import BIT_TABLES, WIRE
+from impactcell.fieldbus.register_map.register_types import BIT_TABLES, WIRE
 from impactcell.fieldbus.registers import Words
 
 _READ_FUNCTION: Final = {

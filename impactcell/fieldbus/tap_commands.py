@@ -21,6 +21,7 @@ from impactcell.errors import (
     ProtocolError,
 )
 from impactcell.fieldbus.acquisition import ModuleAcquisition
+from impactcell.fieldbus.cycles.status_block import PositioningStatus, integer
 from impactcell.fieldbus.positioning_registers import (
     COMMAND,
     DONE,
@@ -30,7 +31,6 @@ from impactcell.fieldbus.positioning_registers import (
     last_sequence,
     next_sequence,
 )
-from impactcell.fieldbus.status_block import PositioningStatus, integer
 
 Objection = Callable[[PositioningStatus], str]
 """Says why a tap is no longer to be made, from what the module shows; nothing where it is."""

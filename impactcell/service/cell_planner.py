@@ -3,8 +3,8 @@
 import math
 
 from impactcell.cell import CellDesign
+from impactcell.fieldbus.cycles.status_block import PositioningStatus
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.fieldbus.status_block import PositioningStatus
 from impactcell.positioning import task_state_machine
 from impactcell.positioning.task_state_machine import TaskState
 from impactcell.records import Snapshot

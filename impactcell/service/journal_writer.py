@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from impactcell.errors import JournalDamagedError, JournalError, JournalGoneError
-from impactcell.fieldbus.taken_cycles import NOTHING_BEFORE, TakenBefore
+from impactcell.fieldbus.cycles.taken_cycles import NOTHING_BEFORE, TakenBefore
 from impactcell.journal.database import set_aside
 from impactcell.journal.retention import NS_PER_DAY, SETTLED_NS, Retention
 from impactcell.journal.salvage import salvaged_state

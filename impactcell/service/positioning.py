@@ -12,8 +12,8 @@ from functools import partial
 from impactcell.cell import CellDesign
 from impactcell.errors import FieldbusError, PositioningError
 from impactcell.fieldbus.acquisition import ModuleAcquisition
+from impactcell.fieldbus.cycles.status_block import PositioningStatus
 from impactcell.fieldbus.positioning_registers import READY
-from impactcell.fieldbus.status_block import PositioningStatus
 from impactcell.fieldbus.tap_commands import ObjectionError, TapCommand, TapCommander
 from impactcell.positioning import PlannerPosterior, task_state_machine
 from impactcell.positioning.task_state_machine import TaskOutcome, TaskPhase, TaskState

@@ -12,7 +12,7 @@ from typing import TypeVar
 from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, RuleResult, Transition
 from impactcell.cell import CellDesign, CellState, StepResult
-from impactcell.fieldbus.taken_cycles import TakenBefore
+from impactcell.fieldbus.cycles.taken_cycles import TakenBefore
 from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.retention import Retention
 from impactcell.journal.store import Journal

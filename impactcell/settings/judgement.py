@@ -12,8 +12,8 @@ from typing import Final
 from impactcell.errors import JournalError
 from impactcell.features import noise_std
 from impactcell.fieldbus.map_promises import not_promised
-from impactcell.fieldbus.map_registers import unknown_names
 from impactcell.fieldbus.positioning_registers import not_placing
+from impactcell.fieldbus.register_map.map_registers import unknown_names
 from impactcell.journal.store import Journal
 from impactcell.physics.local_friction import goes_with_place
 from impactcell.prediction.mass_interpolation import velocity_range_m_s

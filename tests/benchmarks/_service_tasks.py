@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from impactcell.errors import PositioningError
-from impactcell.fieldbus.status_block import PositioningStatus
+from impactcell.fieldbus.cycles.status_block import PositioningStatus
 from impactcell.fieldbus.tap_commands import Objection, ObjectionError, TapCommand, TapCommander
 from impactcell.journal.audit_entries import AuditEntry
 from impactcell.records import Quality

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from impactcell.fieldbus.register_types import KINDS as REGISTER_TYPES
+from impactcell.fieldbus.register_map.register_types import KINDS as REGISTER_TYPES
 from impactcell.physics.effect import LawKind
 from impactcell.positioning import TapPlanner
 from impactcell.service.monitoring import _METRICS

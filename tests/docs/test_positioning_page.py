@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from impactcell.fieldbus.map_registers import SHOWN
 from impactcell.fieldbus.positioning_registers import COMMAND
+from impactcell.fieldbus.register_map.map_registers import SHOWN
 from impactcell.settings.positioning_section import PositioningSection
 from impactcell.settings.sections import ActuatorSection
 

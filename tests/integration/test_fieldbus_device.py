@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
-from impactcell.fieldbus.capture_ring import CYCLE_PERIOD
+from impactcell.fieldbus.cycles.capture_ring import CYCLE_PERIOD
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap

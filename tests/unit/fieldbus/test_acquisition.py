@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from impactcell.fieldbus.acquisition import ModuleAcquisition, ReceivedCycle
-from impactcell.fieldbus.capture_ring import CYCLE_PERIOD
+from impactcell.fieldbus.cycles.capture_ring import CYCLE_PERIOD
+from impactcell.fieldbus.cycles.taken_cycles import TakenBefore
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import RegisterMap, Words
-from impactcell.fieldbus.taken_cycles import TakenBefore
 from impactcell.fieldbus.transports import transport_for
 from impactcell.records import CycleId, ModuleStatus
 from simulator.faults import Fault, FaultKind

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from impactcell.fieldbus.capture_ring import CYCLE_PERIOD, cycles_after, next_capture
+from impactcell.fieldbus.cycles.capture_ring import CYCLE_PERIOD, cycles_after, next_capture
 from impactcell.records import CycleId
 
 SLOTS = 8

@@ -4,10 +4,10 @@ import logging
 
 import pytest
 
-from impactcell.fieldbus.cycle_choice import CycleChoice
-from impactcell.fieldbus.fetched_capture import NotFetched
+from impactcell.fieldbus.cycles.cycle_choice import CycleChoice
+from impactcell.fieldbus.cycles.fetched_capture import NotFetched
+from impactcell.fieldbus.cycles.status_block import StatusBlock
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import CycleId
 

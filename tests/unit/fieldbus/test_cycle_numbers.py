@@ -9,10 +9,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from impactcell.cell.preprocessing import BatchNaming, assign_batch
-from impactcell.fieldbus.capture_ring import next_capture
-from impactcell.fieldbus.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.cycles.capture_ring import next_capture
+from impactcell.fieldbus.cycles.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.cycles.status_block import StatusBlock
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.records import CycleId
 from simulator.modbus_server import ModbusServer
 from simulator.scripted import ScriptedDevice

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from impactcell.fieldbus import decoding, status_block
+from impactcell.fieldbus.cycles import decoding, status_block
 from impactcell.fieldbus.registers import WIRE, RegisterMap, Words
 from impactcell.records import Channel
 

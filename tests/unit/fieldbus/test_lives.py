@@ -12,11 +12,11 @@ from dataclasses import replace
 import pytest
 
 from impactcell.fieldbus.acquisition import ReceivedCycle
-from impactcell.fieldbus.cycle_choice import PATIENCE_S, CycleChoice
-from impactcell.fieldbus.fetched_capture import NotFetched
+from impactcell.fieldbus.cycles.cycle_choice import PATIENCE_S, CycleChoice
+from impactcell.fieldbus.cycles.fetched_capture import NotFetched
+from impactcell.fieldbus.cycles.status_block import StatusBlock
+from impactcell.fieldbus.cycles.taken_cycles import TakenBefore
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.fieldbus.status_block import StatusBlock
-from impactcell.fieldbus.taken_cycles import TakenBefore
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import CycleId
 from simulator.scripted import ScriptedDevice

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from impactcell.errors import LinkError
-from impactcell.fieldbus import capture_reader
+from impactcell.fieldbus.cycles import capture_reader
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.modbus_client import ModbusClient
 from impactcell.fieldbus.registers import WIRE, RegisterMap, Words

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from impactcell.errors import MapError, NotDecimalError
-from impactcell.fieldbus.map_validation import validate_map
-from impactcell.fieldbus.register_types import KINDS
+from impactcell.fieldbus.register_map.map_validation import validate_map
+from impactcell.fieldbus.register_map.register_types import KINDS
 from impactcell.fieldbus.registers import WIRE, Register
 
 INTEGERS = {"u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "i64": "q"}

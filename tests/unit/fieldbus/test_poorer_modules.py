@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from impactcell.errors import MapError, ModbusExceptionError
-from impactcell.fieldbus.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.cycles.cycle_numbers import CycleNumbers
 from impactcell.fieldbus.map_promises import not_promised
 from impactcell.fieldbus.probe import probe
 from impactcell.fieldbus.registers import RegisterMap

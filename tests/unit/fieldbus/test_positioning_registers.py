@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from impactcell.errors import RasterError
 from impactcell.fieldbus.positioning_registers import commanded_values, is_ahead, next_sequence
-from impactcell.fieldbus.register import Register
-from impactcell.fieldbus.register_types import code_range
+from impactcell.fieldbus.register_map.register import Register
+from impactcell.fieldbus.register_map.register_types import code_range
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.numerics.raster import ANY_VALUE
 

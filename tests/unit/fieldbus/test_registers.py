@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pymodbus.client import ModbusTcpClient
 
 from impactcell.errors import MapError
-from impactcell.fieldbus.register_types import SI_FACTOR
+from impactcell.fieldbus.register_map.register_types import SI_FACTOR
 from impactcell.fieldbus.registers import REQUIRED, WIRE, Register, RegisterMap, registers_crc32
 from impactcell.process.file_format import WAY_OUT
 

@@ -87,7 +87,7 @@ async def received_of(
 @pytest.fixture(autouse=True)
 def _polls_follow_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
     """No wait between polls: what is tried here does not depend on when they come."""
-    monkeypatch.setattr("impactcell.fieldbus.poll_schedule.PollSchedule.delay_s", lambda *_: 0.0)
+    monkeypatch.setattr("impactcell.fieldbus.cycles.poll_schedule.PollSchedule.delay_s", lambda *_: 0.0)
 
 
 @pytest.mark.parametrize("age", [1, 2, 5])

@@ -1,7 +1,7 @@
 """What is remembered of cycles that were taken: bounded, the oldest forgotten first."""
 
-from impactcell.fieldbus.cycle_numbers import CycleNumbers
-from impactcell.fieldbus.taken_cycles import TakenCycles
+from impactcell.fieldbus.cycles.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.cycles.taken_cycles import TakenCycles
 from impactcell.records import CycleId
 
 REMEMBERED = 16

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from impactcell.fieldbus.backoff import CEILING_S, Backoff
+from impactcell.fieldbus.cycles.backoff import CEILING_S, Backoff
+from impactcell.fieldbus.cycles.poll_schedule import COARSE_S, FINE_S, IDLE_S, QUIET_S, PollSchedule
 from impactcell.fieldbus.link import SerialLine
-from impactcell.fieldbus.poll_schedule import COARSE_S, FINE_S, IDLE_S, QUIET_S, PollSchedule
 
 ROUND_TRIP_S = 1e-4
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from impactcell.fieldbus.cycle_dates import CycleDates, clock_ahead
-from impactcell.fieldbus.decoding import empty_capture
+from impactcell.fieldbus.cycles.cycle_dates import CycleDates, clock_ahead
+from impactcell.fieldbus.cycles.decoding import empty_capture
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.process.cell_logger import CellLogger
 from simulator.scripted import ScriptedDevice

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from impactcell.fieldbus.plausibility import wrong_word_order
+from impactcell.fieldbus.cycles.plausibility import wrong_word_order
 from impactcell.fieldbus.register_image import RegisterImage, decoded_image, group_registers
 from impactcell.fieldbus.registers import RegisterMap
 from impactcell.records import ModuleStatus

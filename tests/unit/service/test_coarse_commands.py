@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from impactcell.fieldbus.status_block import PositioningStatus
+from impactcell.fieldbus.cycles.status_block import PositioningStatus
 from impactcell.fieldbus.tap_commands import Objection, TapCommand
 from impactcell.positioning import Tap
 from impactcell.service.factory import cell_design, positioning_cell, tap_planner

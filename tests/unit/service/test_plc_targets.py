@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from impactcell.fieldbus.status_block import PositioningStatus
+from impactcell.fieldbus.cycles.status_block import PositioningStatus
 from impactcell.fieldbus.tap_commands import Objection
 from impactcell.service.positioning import PositioningTask
 from tests.told_module import Commander, ToldModule, block

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from impactcell.errors import FieldbusError, LinkError, PositioningError
-from impactcell.fieldbus.status_block import PositioningStatus, StatusBlock
+from impactcell.fieldbus.cycles.status_block import PositioningStatus, StatusBlock
 from impactcell.fieldbus.tap_commands import Objection, ObjectionError
 from impactcell.service.factory import cell_design
 from impactcell.service.positioning import PositioningTask

@@ -15,7 +15,7 @@ from impactcell import cell as core
 from impactcell.alarms import AlarmEvent, EventKind, Message, RuleResult
 from impactcell.alarms.rules import module_connection
 from impactcell.errors import ForeignJournalError, JournalFullError
-from impactcell.fieldbus.taken_cycles import TakenBefore
+from impactcell.fieldbus.cycles.taken_cycles import TakenBefore
 from impactcell.journal.audit_entries import AuditEntry
 from impactcell.journal.history import HistoryQuery
 from impactcell.journal.retention import Retention

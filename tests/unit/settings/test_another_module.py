@@ -11,8 +11,8 @@ from pydantic import ValidationError
 from impactcell.errors import SettingsError
 from impactcell.fieldbus.link import ModuleLink
 from impactcell.fieldbus.map_promises import not_promised
-from impactcell.fieldbus.map_registers import NAMES
-from impactcell.fieldbus.map_validation import validate_map
+from impactcell.fieldbus.register_map.map_registers import NAMES
+from impactcell.fieldbus.register_map.map_validation import validate_map
 from impactcell.fieldbus.registers import Register
 from impactcell.settings import read_cell, read_cells
 from impactcell.settings.cells import read_register_map

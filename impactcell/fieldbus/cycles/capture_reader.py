@@ -15,17 +15,17 @@ from typing import Final
 import numpy as np
 
 from impactcell.errors import FieldbusError, ModbusExceptionError, NotDecimalError, ProtocolError
-from impactcell.fieldbus import decoding
-from impactcell.fieldbus.capture_header import CaptureHeader, at_rest
-from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_after
-from impactcell.fieldbus.cycle_numbers import CycleNumbers
-from impactcell.fieldbus.fetched_capture import FetchedCapture, NotFetched
+from impactcell.fieldbus.cycles import decoding
+from impactcell.fieldbus.cycles.capture_header import CaptureHeader, at_rest
+from impactcell.fieldbus.cycles.capture_ring import NextCapture, cycles_after, is_after
+from impactcell.fieldbus.cycles.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.cycles.fetched_capture import FetchedCapture, NotFetched
+from impactcell.fieldbus.cycles.status_block import integer
+from impactcell.fieldbus.cycles.taken_cycles import TakenCycles
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.register_image import RegisterImage
 from impactcell.fieldbus.registers import WIRE, Value, Words, registers_crc32
 from impactcell.fieldbus.request_batching import PartialBlock
-from impactcell.fieldbus.status_block import integer
-from impactcell.fieldbus.taken_cycles import TakenCycles
 
 _AT_ONCE: Final = 5
 """Readings of one cycle that may be discarded one after the other; then the status block is looked at."""

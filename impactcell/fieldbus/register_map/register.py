@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from impactcell.errors import MapError, NotDecimalError
-from impactcell.fieldbus.bcd import NO_BCD, from_bcd, to_bcd
-from impactcell.fieldbus.register_types import KINDS, SI_FACTOR, WIRE, code_range
+from impactcell.fieldbus.register_map.bcd import NO_BCD, from_bcd, to_bcd
+from impactcell.fieldbus.register_map.register_types import KINDS, SI_FACTOR, WIRE, code_range
 
 Words = NDArray[np.uint16]
 Value = int | float | str | NDArray[Any]

@@ -3,11 +3,11 @@
 from typing import Final
 
 from impactcell.errors import ProtocolError, WrongDeviceError
-from impactcell.fieldbus.plausibility import wrong_word_order
+from impactcell.fieldbus.cycles.plausibility import wrong_word_order
+from impactcell.fieldbus.cycles.status_block import STATUS_REGISTERS, StatusBlock, decode_status
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.register_image import RegisterImage
 from impactcell.fieldbus.registers import registers_crc32
-from impactcell.fieldbus.status_block import STATUS_REGISTERS, StatusBlock, decode_status
 
 _ATTEMPTS: Final = 8
 """Readings until one is proved, before the link counts as broken."""

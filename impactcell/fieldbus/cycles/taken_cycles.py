@@ -10,9 +10,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from impactcell.fieldbus.capture_ring import NextCapture, cycles_after, is_after
-from impactcell.fieldbus.cycle_numbers import CycleNumbers, most_behind
-from impactcell.fieldbus.plausibility import EARLIEST_NS
+from impactcell.fieldbus.cycles.capture_ring import NextCapture, cycles_after, is_after
+from impactcell.fieldbus.cycles.cycle_numbers import CycleNumbers, most_behind
+from impactcell.fieldbus.cycles.plausibility import EARLIEST_NS
 from impactcell.records import CycleId
 
 LIVES: Final = 16

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from impactcell.fieldbus.map_registers import CONSTANTS
-from impactcell.fieldbus.register_types import (
+from impactcell.fieldbus.register_map.map_registers import CONSTANTS
+from impactcell.fieldbus.register_map.register_types import (
     BIT_TABLES,
     KINDS,
     SI_FACTOR,

@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 
-from impactcell.fieldbus.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.cycles.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.cycles.status_block import integer
 from impactcell.fieldbus.register_image import RegisterImage
 from impactcell.fieldbus.registers import Register, RegisterMap, Value
-from impactcell.fieldbus.status_block import integer
 from impactcell.records import CycleId
 
 

@@ -8,13 +8,13 @@ of the ring shows for the last cycle taken decides, as long as the ring holds th
 import enum
 from typing import Final
 
-from impactcell.fieldbus.capture_header import CaptureHeader, at_rest
-from impactcell.fieldbus.capture_ring import is_after
-from impactcell.fieldbus.cycle_numbers import CycleNumbers
-from impactcell.fieldbus.decoding import LATEST_NS, cycle_time_ns
+from impactcell.fieldbus.cycles.capture_header import CaptureHeader, at_rest
+from impactcell.fieldbus.cycles.capture_ring import is_after
+from impactcell.fieldbus.cycles.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.cycles.decoding import LATEST_NS, cycle_time_ns
+from impactcell.fieldbus.cycles.status_block import StatusBlock
+from impactcell.fieldbus.cycles.taken_cycles import TakenCycles
 from impactcell.fieldbus.register_client import RegisterClient
-from impactcell.fieldbus.status_block import StatusBlock
-from impactcell.fieldbus.taken_cycles import TakenCycles
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import CycleId
 

@@ -5,8 +5,8 @@ import time
 from dataclasses import replace
 from typing import Final
 
-from impactcell.fieldbus.plausibility import EARLIEST_NS
-from impactcell.fieldbus.register_types import SI_FACTOR
+from impactcell.fieldbus.cycles.plausibility import EARLIEST_NS
+from impactcell.fieldbus.register_map.register_types import SI_FACTOR
 from impactcell.fieldbus.registers import Register, RegisterMap
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import Capture

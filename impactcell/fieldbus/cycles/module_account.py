@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from impactcell.fieldbus.received_cycle import ReceivedCycle
+from impactcell.fieldbus.cycles.received_cycle import ReceivedCycle
 from impactcell.process.cell_logger import CellLogger
 from impactcell.process.condition_log import kind_of
 from impactcell.records import ModuleStatus

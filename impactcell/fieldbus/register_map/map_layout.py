@@ -3,8 +3,8 @@
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Final
 
-from impactcell.fieldbus.map_registers import ARRAYS, HEADER, NAMES, TEXTS, WRITTEN
-from impactcell.fieldbus.register import Register
+from impactcell.fieldbus.register_map.map_registers import ARRAYS, HEADER, NAMES, TEXTS, WRITTEN
+from impactcell.fieldbus.register_map.register import Register
 
 REGISTER_SPACE: Final = 65_536
 """Addresses of a table: 16 bits."""

@@ -11,8 +11,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from impactcell.fieldbus.cycles.status_block import integer, number
 from impactcell.fieldbus.registers import RegisterMap, Value, Words
-from impactcell.fieldbus.status_block import integer, number
 from impactcell.numerics.local_polynomial import median
 from impactcell.records import Capture, Channel, Samples, Summary, uniform_times
 

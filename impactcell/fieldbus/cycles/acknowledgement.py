@@ -5,10 +5,10 @@ import math
 from typing import Final
 
 from impactcell.errors import FieldbusError, ModbusExceptionError
-from impactcell.fieldbus.capture_ring import is_after
-from impactcell.fieldbus.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.cycles.capture_ring import is_after
+from impactcell.fieldbus.cycles.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.cycles.status_block import StatusBlock
 from impactcell.fieldbus.register_client import RegisterClient
-from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import CycleId
 

@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import Final
 
 from impactcell.errors import ModbusExceptionError, WrongDeviceError
-from impactcell.fieldbus.plausibility import wrong_word_order
+from impactcell.fieldbus.cycles.plausibility import wrong_word_order
+from impactcell.fieldbus.cycles.status_block import StatusBlock
+from impactcell.fieldbus.cycles.status_reader import StatusReader
 from impactcell.fieldbus.register_client import RegisterClient
 from impactcell.fieldbus.registers import Value
-from impactcell.fieldbus.status_block import StatusBlock
-from impactcell.fieldbus.status_reader import StatusReader
 from impactcell.records import CycleId
 
 _NOT_THIS_DEVICE: Final = (1, 2, 3, 10, 11)

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
-from impactcell.fieldbus.capture_ring import NextCapture
-from impactcell.fieldbus.status_block import UNREADABLE, StatusBlock
+from impactcell.fieldbus.cycles.capture_ring import NextCapture
+from impactcell.fieldbus.cycles.status_block import UNREADABLE, StatusBlock
 from impactcell.records import CycleId
 
 _PERIOD: Final[Mapping[str, int]] = {"u16": 2**16, "bcd16": 10**4, "bcd32": 10**8}

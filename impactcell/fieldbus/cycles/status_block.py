@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from impactcell.fieldbus.map_registers import SHOWN
+from impactcell.fieldbus.register_map.map_registers import SHOWN
 from impactcell.fieldbus.registers import Register, RegisterMap, Value
 from impactcell.records import BatchAnnouncement
 

@@ -12,8 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from impactcell.fieldbus.capture_ring import cycles_after
-from impactcell.fieldbus.decoding import HEAVIEST_KG, LIGHTEST_KG
+from impactcell.fieldbus.cycles.capture_ring import cycles_after
+from impactcell.fieldbus.cycles.decoding import HEAVIEST_KG, LIGHTEST_KG
 from impactcell.fieldbus.register_image import RegisterImage
 from impactcell.fieldbus.registers import RegisterMap, Value, registers_crc32
 

@@ -3,11 +3,11 @@
 from dataclasses import replace
 from typing import Final
 
-from impactcell.fieldbus.capture_ring import NextCapture, is_after, is_consistent, next_capture
-from impactcell.fieldbus.cycle_numbers import CycleNumbers
-from impactcell.fieldbus.fetched_capture import NotFetched
+from impactcell.fieldbus.cycles.capture_ring import NextCapture, is_after, is_consistent, next_capture
+from impactcell.fieldbus.cycles.cycle_numbers import CycleNumbers
+from impactcell.fieldbus.cycles.fetched_capture import NotFetched
+from impactcell.fieldbus.cycles.status_block import StatusBlock
 from impactcell.fieldbus.registers import RegisterMap
-from impactcell.fieldbus.status_block import StatusBlock
 from impactcell.process.cell_logger import CellLogger
 from impactcell.records import CycleId
 
