@@ -1,5 +1,6 @@
 """What a record tells of a shot is not exact: where it has to be open, and what is found beside that."""
 
+import contextlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -7,6 +8,7 @@ from impactcell.discrepancy.model import (
     SETTINGS,
     Fit,
     dependence_notes,
+    fit_from,
     implausible_notes,
     setting_scatter,
 )
@@ -19,6 +21,7 @@ from impactcell.discrepancy.search import (
     only_test,
     scan_candidates,
 )
+from impactcell.errors import DiscrepancyError
 
 VELOCITY = SETTINGS[0]
 """What no effect of the library is about where all shots have it wrong alike, as one is of the mass."""
@@ -78,13 +81,14 @@ def find_basis(context: SearchContext, nominals: NominalModels, search: Search) 
     basis = _beside(context, nominals, nominals.start, search)
     while further := _opened_further(basis):
         nominals = further
-        basis = _beside(context, nominals, nominals.start, search)
+        basis = _beside(with_known(context, basis, nominals.start), nominals, nominals.start, search)
     if basis.explains:
         return basis
     already = nominals.exact.opened
     notes: tuple[str, ...] = ()
     for nominal, looks in _others(nominals, search):
-        other = _beside(context, nominals, nominal, looks)
+        known = context if looks is only_test else with_known(context, basis, nominal)
+        other = _beside(known, nominals, nominal, looks)
         if other.explains:
             new = [name for name in nominal.opened if name not in already]
             doubts = _doubts(other, new)
@@ -106,6 +110,19 @@ def _doubts(basis: Basis, opened: Sequence[str]) -> tuple[str, ...]:
 def _beside(context: SearchContext, nominals: NominalModels, nominal: NominalModel, search: Search) -> Basis:
     context = _on(context, nominal)
     return Basis(nominals, nominal, context, search(context, nominal.fit))
+
+
+def with_known(context: SearchContext, basis: Basis, nominal: NominalModel) -> SearchContext:
+    """Fit the likeliest models of each size that a search has found on to shots with more of their own."""
+    likeliest: dict[int, Fit] = {}
+    for one in (basis.selection.accepted, *(other.fit for other in basis.selection.alternatives)):
+        if one is not None and len(one.effects) > len(nominal.fit.effects):
+            likeliest.setdefault(len(one.effects), one)
+    known = []
+    for model in likeliest.values():
+        with contextlib.suppress(DiscrepancyError):  # the plant has no answer there
+            known.append(fit_from(nominal.problem, model))
+    return replace(context, known=tuple(known))
 
 
 def _on(context: SearchContext, nominal: NominalModel) -> SearchContext:

@@ -10,6 +10,8 @@ from impactcell.discrepancy.data.prepared_campaign import prepare, shot_set
 from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.least_squares import Fit, fit, promised_fall
 from impactcell.discrepancy.model.problem import Problem
+from impactcell.discrepancy.nominal_model import NominalModel, NominalModels
+from impactcell.discrepancy.open_records import Basis, with_known
 from impactcell.discrepancy.search import indistinguishability
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.convergence import converge, is_converged
@@ -92,6 +94,36 @@ def test_what_does_not_converge_is_left_out_and_told(
     tried = {effect for one in selection.alternatives for effect in one.effects}
     assert "hunt_crossley_damping" not in {*tried, *selection.added}
     assert any("hunt_crossley_damping" in effects for effects in selection.unconverged)
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_what_an_earlier_search_found_is_a_start_where_none_leads_from_the_nominal_model(
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    is_known: bool,
+) -> None:
+    """Strong Stribeck friction beside open velocities and masses was `unknown`, and its own form the law."""
+    context = context_of("surface_tilt")
+    nominal = fit_nominal(context.problem)
+    known = (fitted(context.problem, nominal, "surface_tilt"),) if is_known else ()
+    monkeypatch.setattr("impactcell.discrepancy.search.one_more.screen", lambda *_: [])
+    context = replace(context, library=("surface_tilt", "viscous_friction"), known=known)
+    selection = select_model(context, nominal)
+    assert selection.added == (("surface_tilt",) if is_known else ())
+
+
+def test_models_of_a_search_go_on_beside_settings_that_are_opened() -> None:
+    context = context_of("surface_tilt")
+    training = np.arange(context.problem.count)
+    floor = sensor_noise(context.prepared)
+    nominal = NominalModel(context.prepared, floor, training, context.problem, fit_nominal(context.problem))
+    context = replace(context, library=("surface_tilt",))
+    basis = Basis(NominalModels(nominal), nominal, context, select_model(context, nominal.fit))
+    opened = nominal.with_settings(("log_velocity",))
+    (known,) = with_known(context, basis, opened).known
+    assert known.effects == ("surface_tilt",)
+    assert promised_fall(opened.problem, known) < 1.0
+    assert known.shot_parameters.log_velocity.any()
 
 
 def test_a_shot_that_alone_tells_a_parameter_makes_no_difference_without_end(

@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from impactcell.discrepancy.data import prepare, sensor_noise, shot_set, split_held_out
-from impactcell.discrepancy.model import Problem
+from impactcell.discrepancy.model import Problem, fit, fit_nominal
+from impactcell.discrepancy.model.shot_freedom import ShotFreedom
 from impactcell.discrepancy.nominal_model import nominal_models
 from impactcell.discrepancy.report.german_notes import note
 from impactcell.discrepancy.workflow import DiscrepancyResult
@@ -148,6 +150,37 @@ def test_an_onset_stays_within_its_step() -> None:
     moved = problem.freedom.step(problem.initial_guess(), steps)
     np.testing.assert_array_equal(moved.onset_s, problem.onset_step_s)
     assert problem.onset_step_s == pytest.approx(STEP_S)
+
+
+def test_a_fit_comes_to_its_optimum_where_contact_of_some_shots_would_lie_beyond_their_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A step of the plant that counts on their contact to go on makes them worse: it held up the fit of all.
+
+    Held against scipy's least squares within bounds, over the plant and every shot's friction and contact.
+    """
+    prepared = prepare(logged(JOB, before=BEFORE)[0])
+    some = shot_set(prepared, np.arange(10), (0.4, 1.5e-6, 1.5e-6))
+    free = fit_nominal(Problem(some, len(prepared.batches)))
+    step_s = 0.5 * float(np.median(np.abs(free.shot_parameters.onset_s)))
+    widest = ShotFreedom.of
+    monkeypatch.setattr(ShotFreedom, "of", lambda s: replace(widest(s), onset_step_s=np.full(len(s), step_s)))
+    problem = Problem(some, len(prepared.batches))
+    model = fit(problem, free.theta, problem.initial_guess())
+    shots, count = model.shot_parameters, len(model.theta)
+    assert 2 < (np.abs(shots.onset_s) >= step_s).sum() < problem.count
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        theta, factor, onset = np.split(x, [count, count + problem.count])
+        own = replace(shots, log_factor=factor, onset_s=onset * step_s)
+        return np.append(problem.residual(theta, own), factor / model.spread)
+
+    start = np.concatenate([model.theta, shots.log_factor, shots.onset_s / step_s])
+    lower, upper = problem.bounds()
+    ends = np.append(np.full(problem.count, np.inf), np.ones(problem.count))
+    bounds = (np.append(lower, -ends), np.append(upper, ends))
+    best = least_squares(residuals, np.clip(start, *bounds), bounds=bounds, x_scale="jac", diff_step=1e-6)
+    assert model.state.cost < 2.0 * best.cost + 1.0
 
 
 def test_force_at_first_contact_itself_is_no_gap() -> None:

@@ -1,4 +1,4 @@
-"""Intervals beside a coordinate that comes to its bound, and those that hold for tied models as well."""
+"""Intervals by refits: beside a bound, where the curvature changes, and those that hold for tied models."""
 
 import math
 from dataclasses import replace
@@ -13,6 +13,7 @@ from impactcell.discrepancy.model.initial_guess import fit_nominal
 from impactcell.discrepancy.model.intervals import ParameterEstimate, estimate_parameters
 from impactcell.discrepancy.nominal_model import problem_of
 from tests.discrepancy import study
+from tests.discrepancy.study import Job, campaign, scenario
 from tests.discrepancy.test_convergence import context_of, fitted
 
 pytestmark = pytest.mark.slow
@@ -64,6 +65,39 @@ def test_a_range_that_is_all_there_is_becomes_what_the_data_allow(compliant: tup
     limit = 2.2**2
     beyond, within = (_at_ratio(problem, stuck, math.log(at)) for at in (1.1 * ratio.high, ratio.high))
     assert within.state.cost <= stuck.state.cost + limit < beyond.state.cost
+
+
+@pytest.mark.parametrize("number", [15, 22, 38])
+def test_a_ratio_beside_friction_at_small_speeds_is_known_no_better_than_first_motion_shows(
+    number: int,
+) -> None:
+    """With the slope at the optimum alone 1.22 was outside: below 1.25 the fit hardly changes with mu_s."""
+    job = Job("single", ("stribeck_friction",), 700_000 + number, shots=40, actuator=bool(number % 2))
+    job = replace(job, coloured=number % 3 == 0)
+    plan, prepared = scenario(job), prepare(campaign(job))
+    training, _ = split_held_out(prepared, job.seed)
+    problem = problem_of(prepared, sensor_noise(prepared), training)
+    model = problem.with_effects(job.hidden)
+    truth = {**study.strengths("stribeck_friction", 1.0), **plan.plant.model_dump()}
+    truth |= {"mu_k": truth["mu_s"] * truth["ratio"], "ratio": 1.0 / truth["ratio"]}
+    start = np.array([one.coordinate(truth[one.parameter]) for one in model.coordinates])
+    start[RATIO] = model.coordinates[RATIO].initial
+    found = fit(model, start, fit_nominal(problem).shot_parameters)
+    linearisation = linearise(problem, found)
+    alone = estimate_parameters(found, linearisation)[RATIO]
+    held = profile_parameters(problem, found, linearisation)[RATIO]
+    assert not alone.low <= truth["ratio"] <= alone.high
+    assert held.low <= truth["ratio"] <= held.high == pytest.approx(alone.high, rel=0.02)
+    assert (held.at_bound, held.low == 1.0) in ((True, True), (False, False))
+
+
+def test_a_ratio_that_is_well_seen_keeps_the_interval_of_its_slope() -> None:
+    problem = context_of("viscous_friction").problem
+    found = fitted(problem, fit_nominal(problem), "viscous_friction")
+    linearisation = linearise(problem, found)
+    alone = estimate_parameters(found, linearisation)[RATIO]
+    held = profile_parameters(problem, found, linearisation)[RATIO]
+    assert held.high - held.low == pytest.approx(alone.high - alone.low, rel=0.1)
 
 
 def test_beside_what_remains_they_hold_what_fits_as_well_further_from_a_bound() -> None:

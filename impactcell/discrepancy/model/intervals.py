@@ -75,8 +75,7 @@ def variances(
     seen = np.diag(H) > UNSEEN_SHARE * float(np.diag(H).max(initial=0.0))
     H = H[np.ix_(seen, seen)]
     n, p = len(linearisation.shot_gradient), len(H)
-    scale = np.sqrt(np.diag(H))
-    inverse = np.linalg.pinv(H / np.outer(scale, scale), rcond=1e-12, hermitian=True) / np.outer(scale, scale)
+    inverse = inverse_of(H)
     between_shots, parts = np.zeros(p), np.zeros((n, p))
     for i in range(n):
         share = linearisation.shot_information[i][np.ix_(seen, seen)] @ inverse
@@ -92,6 +91,14 @@ def variances(
     if shared_error is not None:
         variance[seen] += shared_error.variance @ (shared_error.shapes[:, seen] @ inverse) ** 2
     return variance
+
+
+def inverse_of(information: Samples) -> Samples:
+    """Inverse of an information matrix, shape (p, p), whose coordinates have scales of their own."""
+    scale = np.sqrt(np.diag(information))
+    scales = np.outer(scale, scale)
+    inverse: Samples = np.linalg.pinv(information / scales, rcond=1e-12, hermitian=True) / scales
+    return inverse
 
 
 def estimate_parameters(

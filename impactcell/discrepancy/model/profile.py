@@ -1,7 +1,9 @@
-"""Intervals beside a coordinate that ends at a bound: what else fits as well, by refits along it.
+"""Intervals where a linearised fit does not tell how far data allow a coordinate to go: by refits along it.
 
-A linearised fit tells nothing of what lies further along such a coordinate. mu_s/mu_k beside a compliant
+It tells nothing of what lies further along a coordinate that ends at a bound. mu_s/mu_k beside a compliant
 stiction has no slope at 1, and yet at 1.3 the fit is as good, with another stiffness of the stiction.
+Nor is the curvature at the optimum that further on where it falls: the smaller mu_s, the sooner a part breaks
+away, and the less its first motion shows of it.
 """
 
 import math
@@ -13,6 +15,7 @@ from impactcell.discrepancy.model.intervals import (
     SharedError,
     estimate_parameters,
     interval_quantile,
+    inverse_of,
 )
 from impactcell.discrepancy.model.least_squares import Fit, fit
 from impactcell.discrepancy.model.linearisation import LinearisedFit, linearise
@@ -24,6 +27,9 @@ from impactcell.records import Samples
 
 HALVINGS = 5
 """Times that the way to the end of an interval is halved to find how far the data allow it."""
+BENT, STEPS_OUT = "ratio", 8
+"""Coordinate of the plant along which the curvature changes much, mu_s/mu_k, and how many halves of its
+interval the data may allow it to go."""
 
 
 def profile_parameters(
@@ -38,9 +44,16 @@ def profile_parameters(
     Along such a coordinate the others are refitted as far as the cost rises by no more than the squared
     quantile of the intervals (profile likelihood; Venzon and Moolgavkar 1988); their intervals hold those of
     the optimum and of both ends. A coordinate whose interval is all its range is as uncertain as it moves.
-    A penalty is that of the fit, shape (p, p).
+    mu_s/mu_k, along which the curvature changes, goes as far as the cost rises by what its interval's end
+    would make it rise by with the curvature at the optimum. A penalty is that of the fit, shape (p, p).
     """
     estimates = estimate_parameters(model, linearisation, shared_error, penalty)
+    estimates = tuple(
+        _as_far_as_it_bends(problem, model, linearisation, column, estimate)
+        if estimate.parameter == BENT and not estimate.effect and not estimate.at_bound and penalty is None
+        else estimate
+        for column, estimate in enumerate(estimates)
+    )
     quantile = interval_quantile(model, linearisation, penalty)
     limit = quantile**2 * max(linearisation.mean_squared_residual, 1.0)
     joined = estimates
@@ -58,6 +71,23 @@ def profile_parameters(
             own = replace(estimate, low=values[0], high=values[1])
             joined = (*joined[:column], own, *joined[column + 1 :])
     return joined
+
+
+def _as_far_as_it_bends(
+    problem: Problem, model: Fit, linearisation: LinearisedFit, column: int, estimate: ParameterEstimate
+) -> ParameterEstimate:
+    """Widen an interval to where the profile of the cost is as high as a parabola would be at its ends."""
+    coordinate, middle = model.coordinates[column], float(model.theta[column])
+    curvature = 1.0 / inverse_of(linearisation.information)[column, column]
+    values = [estimate.low, estimate.high]
+    for end in (estimate.low, estimate.high):
+        half = coordinate.coordinate(end) - middle
+        limit = curvature * half**2
+        reached = _outwards(problem, model, column, half, limit)
+        values.append(coordinate.value(float(reached.theta[column])))
+    low, high = min(values), max(values)
+    ends = (coordinate.value(coordinate.lower), coordinate.value(coordinate.upper))
+    return replace(estimate, low=low, high=high, at_bound=low <= ends[0] or high >= ends[1])
 
 
 def join_intervals(
@@ -83,6 +113,23 @@ def _joined(first: ParameterEstimate, other: ParameterEstimate) -> ParameterEsti
 def _is_angle(estimate: ParameterEstimate) -> bool:
     parameters = find_effect(estimate.effect).parameters if estimate.effect else ()
     return any(one.name == estimate.parameter and one.kind is ParameterKind.PHASE for one in parameters)
+
+
+def _outwards(problem: Problem, model: Fit, column: int, half: float, limit: float) -> Fit:
+    """Fit with a coordinate as far out as the data allow, by steps of the half of its interval."""
+    coordinate, reached = model.coordinates[column], model
+    for step in range(1, STEPS_OUT + 1):
+        out = float(model.theta[column]) + step * half
+        end = min(max(out, coordinate.lower), coordinate.upper)
+        refitted = _pinned_fit(problem, reached, column, end)
+        if refitted is None or refitted.state.cost > model.state.cost + limit:
+            risen = model.state.cost + limit - reached.state.cost
+            beyond = _furthest(problem, reached, column, end, risen) if step > 1 else None
+            return beyond or reached
+        reached = refitted
+        if end != out:
+            break
+    return reached
 
 
 def _furthest(problem: Problem, model: Fit, column: int, end: float, limit: float) -> Fit | None:

@@ -147,7 +147,9 @@ def normal_equations(
     -------
     H, g, equations
         Information, shape (p, p), and minus half the cost's gradient, shape (p,), of the shared coordinates
-        (Schur complement), so that a step is H^-1 g; and the shots' own blocks, their gradients alike.
+        (Schur complement), so that a step is H^-1 g; and the shots' own blocks, their gradients alike. What a
+        shot has of its own stays where it presses against an end of its range: a step of the shared ones
+        that counts on it to go on would find the shot no better.
     """
     q, p = len(Jl), len(J)
     gram = gram_of_shots(np.vstack([Jl, J, state.residual]), problem.shots.bounds)
@@ -156,9 +158,14 @@ def normal_equations(
     H, g = whole[:p, :p], whole[:p, -1]
     A[:, np.arange(q), np.arange(q)] += _weights(problem, state.spread)
     gl -= _pull(problem, state)
+    held = problem.freedom.pressed(state.shot_parameters, gl)
+    gl[held], C[held] = 0.0, 0.0
+    of_held = held[:, :, None] | held[:, None, :]
+    A[of_held] = 0.0
     diagonal = np.einsum("iqq->iq", A)
     A[:, np.arange(q), np.arange(q)] += RIDGE * diagonal + (diagonal == 0.0)
     inverse = np.asarray(np.linalg.inv(A), dtype=np.float64)
+    inverse[of_held] = 0.0
     eliminated = (inverse @ C).reshape(problem.count * q, p).T
     H = H - eliminated @ C.reshape(problem.count * q, p)
     g = g - eliminated @ gl.ravel()

@@ -83,3 +83,18 @@ class ShotFreedom:
             else:
                 changed[name] = changed[name] + steps[:, column]
         return replace(shot_parameters, **changed)
+
+    def pressed(self, shot_parameters: ShotParameters, gradient: Samples) -> NDArray[np.bool_]:
+        """Which of the shots' own numbers are at an end of their range beyond which they would go, (n, q).
+
+        Parameters
+        ----------
+        gradient : ndarray, shape (n, q)
+            Minus that of the cost: in the direction of its fall.
+        """
+        pressed = np.zeros(gradient.shape, dtype=np.bool_)
+        if "onset_s" in self.names:
+            column, onset = self.names.index("onset_s"), shot_parameters.onset_s
+            at_end = (np.abs(onset) >= self.onset_step_s) & (self.onset_step_s > 0.0)
+            pressed[:, column] = at_end & (np.sign(onset) == np.sign(gradient[:, column]))
+        return pressed

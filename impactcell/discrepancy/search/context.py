@@ -35,6 +35,9 @@ class SearchContext:
         Applies a function to many candidates, in parallel where it can.
     floor_is_certain : bool
         What is above the floor is a gap: the noise is stated, or sampled fast enough to be seen.
+    known : tuple of Fit
+        Fits of an earlier search, in which records were taken as they tell, fitted on to these shots: where
+        a shot has more of its own, the nominal model may lie too far from them to come there.
     """
 
     problem: Problem
@@ -44,6 +47,7 @@ class SearchContext:
     seed: int
     mapper: Mapper
     floor_is_certain: bool
+    known: tuple[Fit, ...] = ()
 
     def test_model(self, model: Fit) -> ModelEvidence:
         """All evidence against a model."""

@@ -141,13 +141,22 @@ def _fit_beside(
     last = fit_all_samples(
         context, [one for one in finalists(context, rough, state.nominal.effects) if one not in before]
     )
-    converged, stuck = converge(context, last, state.smaller(size))
+    converged, stuck = converge(context, [*last, *_known(context, state, size)], state.smaller(size))
     return replace(
         merge(context, state, size, converged),
         rough=state.rough | {size: rough},
         scans=[*state.scans, *(scan for scan in scans if scan not in state.scans)],
         unconverged=[*state.unconverged, *stuck],
     )
+
+
+def _known(context: SearchContext, state: SearchState, size: int) -> list[Fit]:
+    """List fits of an earlier search with so many effects more, of sets that this one has not fitted yet."""
+    fitted = {frozenset(one.effects) for one in state.fits(size)}
+    effects = len(state.nominal.effects) + size
+    return [
+        one for one in context.known if len(one.effects) == effects and frozenset(one.effects) not in fitted
+    ]
 
 
 def _scans(context: SearchContext, state: SearchState, bases: Sequence[Fit]) -> list[CandidateScan]:
