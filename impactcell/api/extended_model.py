@@ -7,6 +7,7 @@ from pathlib import Path
 
 from impactcell.api.friction import calibrated
 from impactcell.campaign import Campaign, Excitation
+from impactcell.discrepancy.model import ParameterEstimate
 from impactcell.discrepancy.search import Remaining
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.errors import PhysicsError, PredictionError
@@ -143,8 +144,16 @@ def _extended_plant(result: DiscrepancyResult, nominal: Plant | None) -> Plant:
 
 
 def _prior(result: DiscrepancyResult, plant: Plant, nominal: Prior | None) -> Prior:
-    """Tell how well the plant is known; what these shots tell nothing of, as well as before."""
-    half = {one.parameter: (one.high - one.low) / 4.0 for one in result.parameters if not one.effect}
+    """Tell how well the plant is known; what these shots tell nothing of, as well as before.
+
+    What has come to a bound beside something that no effect explains is not told: it went there for that.
+    """
+    remains = not result.conclusion.remaining.explained
+    half = {
+        one.parameter: math.inf if remains and _is_at_bound(one) else (one.high - one.low) / 4.0
+        for one in result.parameters
+        if not one.effect
+    }
     ratio = plant.mu_k / plant.mu_s
     fitted = {
         "stiffness_std_n_per_m": (half.get("stiffness_n_per_m"), plant.stiffness_n_per_m),
@@ -183,6 +192,10 @@ def _effects(result: DiscrepancyResult) -> dict[str, dict[str, float | Sequence[
     return effects
 
 
+def _is_at_bound(one: ParameterEstimate) -> bool:
+    return one.at_bound and one.value in (one.low, one.high)
+
+
 def _positive(std: float, magnitude: float) -> float:
-    smallest = SMALLEST_SHARE * magnitude
-    return max(std, smallest) if math.isfinite(std) else smallest
+    """Give a standard deviation that a prior can have; the magnitude itself where nothing tells it."""
+    return max(std, SMALLEST_SHARE * magnitude) if math.isfinite(std) else magnitude

@@ -39,7 +39,9 @@ def provenance_of(
         validation=SimpleNamespace(gap_before=3.588, gap_after=1.5),
         conclusion=SimpleNamespace(remaining=remaining),
         prepared=SimpleNamespace(gravity_m_s2=9.81),
-        parameters=[ParameterEstimate("", name, 0, *ends, False) for name, ends in intervals.items()],
+        parameters=[
+            ParameterEstimate("", name, 0, *ends, ends[0] == ends[1]) for name, ends in intervals.items()
+        ],
     )
     data: Any = SimpleNamespace(excitation=Excitation.DRIVEN, stroke_m=1.2e-3)
     write_extended_model(result, data, "c3", None, folder / "model.yaml")
@@ -56,6 +58,15 @@ def test_a_number_that_nothing_tells_is_said_to_be_of_no_use(tmp_path: Path) -> 
     assert provenance_of(tmp_path, wide)[UNTOLD] == (
         "k 398662 ± 5e+10 N/m, b 298.3 ± 2e+05 N s/m (± is 95 %)"
     )
+
+
+def test_a_number_that_came_to_its_bound_for_what_is_missing_is_not_known_exactly(tmp_path: Path) -> None:
+    """It stood in the file with a deviation of 0.0001, and every tap was estimated with mu_s = mu_k."""
+    at_bound = {**KNOWN, "ratio": (1.0, 1.0, 1.0)}
+    assert UNTOLD not in provenance_of(tmp_path, at_bound)
+    remaining = Remaining(False, 1.0, (), 4.4)
+    assert UNTOLD not in provenance_of(tmp_path, KNOWN, (), remaining)
+    assert provenance_of(tmp_path, at_bound, (), remaining)[UNTOLD] == "mu_k/mu_s 1.0000 ± 2 (± is 95 %)"
 
 
 @pytest.mark.parametrize(
