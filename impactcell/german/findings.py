@@ -149,7 +149,13 @@ def german_equation(equation: str) -> str:
     said = re.sub(r" with (?=s\()", " mit ", with_decimal_commas(equation))
     said = said.replace("u a column of shots.csv", "u = Spalte von shots.csv")
     said = said.replace("the part that differs: ", "davon der Unterschied: ")
-    said = said.replace(" and w the ", " und w the ")
+    said = re.sub(r"\bpull s\(gap(.*?), gap <", r"Anziehung s(Abstand\1, Abstand <", said)
+    for english, german in (
+        (" and w the ", " und w the "),
+        (" on the part", " auf das Teil"),
+        (" is shown", " wird angezeigt"),
+    ):
+        said = said.replace(english, german)
     words = "|".join(GERMAN_COVARIATES)
     return re.sub(rf"\b([uw]) the ({words}|\w+)", lambda m: f"{m[1]} = {names.get(m[2], m[2])}", said)
 
@@ -200,9 +206,17 @@ def german_headline(result: Mapping[str, Any]) -> str:
             what = "Ein Gesetz neben den mitgegebenen passt dazu"
         if law.get("term"):
             what = f"{german_effect(law['term'])} passt dazu, ist aber nicht benannt"
-        said += f" {what}: {german_equation(law['equation'])}."
+        said += f" {what}: {german_equation(law['equation'])}{_fall_by(law)}."
     said += _follows(result.get("simulation"))
     return f"{said} (Abweichungen an zurückgehaltenen Messungen; 1 ist das Rauschen der Sensoren.)"
+
+
+def _fall_by(law: Mapping[str, Any]) -> str:
+    """Say what a law takes of the held-out gap; nothing where its format does not have it."""
+    gap = law.get("held_out")
+    if not gap or None in (gap["before"], gap["after"]):
+        return ""
+    return with_decimal_commas(f"; damit fällt die Abweichung von {gap['before']:.2f} auf {gap['after']:.2f}")
 
 
 def _counts(result: Mapping[str, Any]) -> str:

@@ -14,6 +14,7 @@ from impactcell.api.findings import write_findings
 from impactcell.campaign import Campaign
 from impactcell.discrepancy.laws.grammar import ATOMS, Atom, evaluate, shaped_terms
 from impactcell.discrepancy.workflow import DiscrepancyResult, investigate
+from impactcell.german.findings import german_headline
 from impactcell.physics import Effect, Plant, TapInput, simulate_tap
 from impactcell.physics.effect_contract import contract_faults
 from impactcell.physics.effects import find_effect, withdraw_effect
@@ -79,7 +80,12 @@ def test_result_report_and_effect_file_say_the_same(found: DiscrepancyResult, tm
     assert (
         "Was den Rest erklären würde: Quadratischer Widerstand" in (tmp_path / "report.de.html").read_text()
     )
-    assert law["file"] in page
+    assert f"--effects {law['file']} -o DIR" in page
+    (interval,) = (one["ci95"] for one in law["parameters"].values())
+    assert f"{interval[0]:.5g} to {interval[1]:.5g}" in page
+    assert f"{law['held_out']['before']:.2f} auf {law['held_out']['after']:.2f}".replace(".", ",") in (
+        german_headline(outcome)
+    )
     space: dict[str, object] = {}
     exec((tmp_path / law["file"]).read_text(), space)
     effect = space["EFFECT"]

@@ -1,14 +1,13 @@
 """A law that nobody had listed, from what remains to what is proposed, proved on shots that were held out."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from impactcell.discrepancy.laws.condense import rank_forms
 from impactcell.discrepancy.laws.covariates import FEWEST_VALUES, poor_columns
 from impactcell.discrepancy.laws.fitted_function import (
-    FittedFunction,
     drawn_function,
     effective_numbers,
     gives_energy,
@@ -21,10 +20,15 @@ from impactcell.discrepancy.laws.free_term import (
     free_forms_of,
     pair_forms_of,
 )
-from impactcell.discrepancy.laws.law import Law
+from impactcell.discrepancy.laws.law_finding import LawFinding
 from impactcell.discrepancy.laws.refit import FittedLaw, refit_forms, tied_with
 from impactcell.discrepancy.laws.tangent import tangent
-from impactcell.discrepancy.model import Fit, Problem, fit, refit_shot_parameters
+from impactcell.discrepancy.model import (
+    Fit,
+    Problem,
+    fit,
+    refit_shot_parameters,
+)
 from impactcell.discrepancy.search import GapChange, GapMeasure, Outdone, Part
 from impactcell.errors import DiscrepancyError
 from impactcell.physics.free_column_forms import printed
@@ -42,60 +46,6 @@ MOST_STEPS = 9
 """Gauss-Newton steps with all samples, from where few came to rest."""
 SETTLING_STEPS = 40
 """And with few, of a spline that is proposed itself: most rest long before."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LawFinding:
-    """What was found where something remained.
-
-    Attributes
-    ----------
-    term : FreeTerm
-        Free-form term at the place that predicts best.
-    function : FittedFunction
-        Of two covariates at the median of the second.
-    slices : tuple of (float, FittedFunction)
-        The same at several values of the second covariate; empty where there is one alone.
-    law : FittedLaw or None
-        Functional form that does as well; None where only the spline does.
-    equivalents : tuple of FittedLaw
-        Other forms that the data cannot tell from it.
-    rival_places : tuple of str
-        Effects of other places at which a term predicts as well.
-    change : GapChange
-        Of the held-out gap, without and with it: the law where there is one, else the spline.
-    model : Problem
-        Training shots with that term in the model.
-    training, held_out : Fit
-        The same, fitted.
-    refused : str
-        Why nothing is proposed; empty where something is.
-    """
-
-    term: FreeTerm
-    function: FittedFunction
-    slices: tuple[tuple[float, FittedFunction], ...]
-    law: FittedLaw | None
-    equivalents: tuple[FittedLaw, ...]
-    rival_places: tuple[str, ...]
-    change: GapChange
-    model: Problem
-    training: Fit
-    held_out: Fit
-    refused: str
-
-    @property
-    def proposed(self) -> Law | None:
-        """The law with the numbers that all training shots gave; None where there is none to propose."""
-        if self.law is None or self.refused:
-            return None
-        values = {
-            item.parameter: item.value(float(self.training.theta[place]))
-            for place, item in enumerate(self.training.coordinates)
-            if item.effect == self.law.law.identifier
-        }
-        law = self.law.law
-        return replace(law, parameters=tuple(item.starting_at(values[item.name]) for item in law.parameters))
 
 
 def find_law(

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from impactcell.discrepancy.data import BETWEEN_SHOTS
-from impactcell.discrepancy.model import ParameterEstimate, estimate_parameters, linearise
+from impactcell.discrepancy.model import ParameterEstimate
 from impactcell.discrepancy.report.sentences import headline
 from impactcell.discrepancy.search import (
     Gap,
@@ -156,15 +156,13 @@ def _law(result: DiscrepancyResult) -> dict[str, Any]:
     if finding is None or finding.refused:
         return {"law": None, "law_refused": finding.refused if finding else None}
     form, law = finding.term.form, finding.proposed
-    effect = form.effect.identifier if law is None else law.identifier
-    estimates = estimate_parameters(finding.training, linearise(finding.model, finding.training))
     document = {
         "place": form.effect.equation,
         "covariates": list(form.covariates),
         "form": SPLINE_ONLY if law is None else law.functional_form,
         "equation": form.effect.equation if law is None else law.equation,
         "term": (law.listed or None) if law else None,
-        "parameters": {} if law is None else _parameters([one for one in estimates if one.effect == effect]),
+        "parameters": _parameters(list(finding.estimates)),
         "equivalents": [item.law.functional_form for item in finding.equivalents],
         "rival_places": [find_effect(place).equation for place in finding.rival_places],
         "tested_range": {

@@ -170,6 +170,7 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
     if finding is None:
         return None
     form, law = finding.term.form, finding.proposed
+    units = {} if law is None else {item.name: item.unit for item in law.parameters}
     tested = [
         f"{printed(name).replace('_', ' ')} from {low:.3g} to {high:.3g}{'' if unit == '1' else f' {unit}'}"
         for name, unit, (low, high) in finding.term.tested
@@ -187,7 +188,7 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
         "rivals": [find_effect(place).equation for place in finding.rival_places],
         "tested": " and ".join(tested),
         "file": None if law is None else f"{law.identifier}.py",
-        "parameters": [] if law is None else [(item.name, item.first, item.unit) for item in law.parameters],
+        "parameters": [(one.parameter, one, units[one.parameter]) for one in finding.estimates],
     }
 
 
