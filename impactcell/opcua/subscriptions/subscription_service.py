@@ -1,7 +1,6 @@
 """Subscription services (Part 4, 5.14) for all sessions.
 
-Mended: see `subscription` and `monitored_item`; and asyncua lets every session use, and delete, the
-subscriptions of others.
+Mended: see `subscription` and `monitored_item`; asyncua lets every session use, and delete, those of others.
 """
 
 import asyncio

@@ -60,7 +60,7 @@ async def test_a_counter_that_goes_on_is_no_new_reason(
         return told
 
     for module_name in ("status_reader", "identity"):
-        monkeypatch.setattr(f"impactcell.fieldbus.{module_name}.wrong_word_order", proved)
+        monkeypatch.setattr(f"impactcell.fieldbus.cycles.{module_name}.wrong_word_order", proved)
     device = ScriptedDevice(layout, session=7)
     make(device, 20)
     statuses = [ModuleStatus()]
