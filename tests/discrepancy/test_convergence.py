@@ -12,11 +12,17 @@ from impactcell.discrepancy.model.least_squares import Fit, fit, promised_fall
 from impactcell.discrepancy.model.problem import Problem
 from impactcell.discrepancy.nominal_model import NominalModel, NominalModels
 from impactcell.discrepancy.open_records import Basis, with_known
-from impactcell.discrepancy.search import indistinguishability
+from impactcell.discrepancy.search import indistinguishability, model_selection
+from impactcell.discrepancy.search.acceptance import reject
 from impactcell.discrepancy.search.context import SearchContext
 from impactcell.discrepancy.search.convergence import converge, is_converged
-from impactcell.discrepancy.search.indistinguishability import evaluate_out_of_shot, total_log_likelihood
+from impactcell.discrepancy.search.indistinguishability import (
+    evaluate_out_of_shot,
+    rank_out_of_shot,
+    total_log_likelihood,
+)
 from impactcell.discrepancy.search.model_selection import select_model
+from impactcell.discrepancy.search.one_more import SearchState
 from impactcell.physics.effects import LIBRARY
 from tests.discrepancy.test_workflow import make
 
@@ -110,6 +116,27 @@ def test_what_an_earlier_search_found_is_a_start_where_none_leads_from_the_nomin
     context = replace(context, library=("surface_tilt", "viscous_friction"), known=known)
     selection = select_model(context, nominal)
     assert selection.added == (("surface_tilt",) if is_known else ())
+
+
+@pytest.mark.parametrize("is_at_floor", [True, False])
+def test_factors_are_asked_first_only_where_no_effect_brings_the_traces_to_the_noise(
+    monkeypatch: pytest.MonkeyPatch,
+    *,
+    is_at_floor: bool,
+) -> None:
+    """Strong tilt beside contact damping was asymmetry alone, and the traces stayed 2.7 floors off."""
+    context = context_of("hunt_crossley_damping")
+    nominal = fit_nominal(context.problem)
+    single = fitted(context.problem, nominal, "hunt_crossley_damping" if is_at_floor else "surface_tilt")
+    assert context.reaches_floor(single) == is_at_floor
+    evidence = context.test_model(nominal)
+    asked = []
+    monkeypatch.setattr(model_selection, "accept_between_shots", lambda *_: asked.append(1))
+    monkeypatch.setattr(model_selection, "accept_dominant", lambda *_: None)
+    fits = rank_out_of_shot(context.problem, [single])
+    state = SearchState({0: evidence}, {1: [single]}, {1: fits}, result=reject(evidence, evidence, ()))
+    model_selection._dominant_or_none(context, state)
+    assert bool(asked) != is_at_floor
 
 
 def test_models_of_a_search_go_on_beside_settings_that_are_opened() -> None:
