@@ -54,15 +54,15 @@ def _dominant_or_none(context: SearchContext, state: SearchState) -> SelectionRe
     """Accept what stands out between shots or in the traces where nothing suffices, else nothing.
 
     Shots are independent; what is left in the traces is not. So the friction factors are asked first, and
-    give a name only where no fit of the traces explains them better, and no single effect brings the traces
-    to the noise: that one stands out, and the factors are asked beside it.
+    give a name only where no fit of the traces explains them better, and no single effect brings traces that
+    are off to the noise: that one stands out, and the factors are asked beside it.
     """
     if state.result is None:
         raise AssertionError("only a search that has ended")
     screened = state.rough.get(1, [])
     trials = [*state.fits(1), *screened, *state.unconverged]
     with_one_more = [trial for trial in trials if len(trial.effects) == len(state.nominal.effects) + 1]
-    if not (context.floor_is_certain and any(map(context.reaches_floor, state.fits(1)))):
+    if context.reaches_floor(state.nominal) or not any(map(context.reaches_floor, state.fits(1))):
         between = accept_between_shots(context, state.tested[0], with_one_more)
         if between is not None:
             return between
