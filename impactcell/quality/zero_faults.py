@@ -49,15 +49,16 @@ def zero_faults(shots: Sequence[Capture]) -> list[DataFault]:
     forces = [
         shot.force.values for shot in shots if shot.force is not None and np.ptp(shot.force.values) > 0.0
     ]
-    rests = [rest for rest in map(_rest, forces) if math.isfinite(rest.level)]
+    seen = [(force, rest) for force in forces if math.isfinite((rest := _rest(force)).level)]
+    rests = [rest for _, rest in seen]
     if len(rests) < MIN_SHOTS:
         return []
     level = np.array([rest.level for rest in rests])
     place = np.arange(len(level), dtype=np.float64)
     slope, start = np.polyfit(place, level, 1)
-    scatter = float(np.std(level - (start + slope * place), ddof=2))
-    largest = float(np.median([force.max() for force in forces]))
-    return [*_drifts(float(start), float(slope), len(level), scatter, largest), *_wanders(scatter, rests)]
+    scatter = float(np.std(level - (start + slope * place)))
+    largest = float(np.median([force.max() for force, _ in seen]))
+    return _drifts(float(start), float(slope), len(level), scatter, largest) or _wanders(scatter, rests)
 
 
 def _rest(force: Samples) -> Rest:

@@ -1,4 +1,4 @@
-"""Forces of a fitted model by the state of the machine: anywhere, at rest, and where it was measured."""
+"""Forces of a fitted model by the state of the machine: anywhere, and at rest."""
 
 from collections.abc import Callable, Mapping, Sequence
 
