@@ -14,6 +14,11 @@ import numpy as np
 from impactcell.discrepancy.data import decimate
 from impactcell.discrepancy.laws.column_rivals import hold_against_columns
 from impactcell.discrepancy.laws.free_term import FreeTerm, candidate_terms
+from impactcell.discrepancy.laws.nearly_sufficient import (
+    SAMPLES_OF_LITTLE,
+    leaves_a_little,
+    outdone_elsewhere,
+)
 from impactcell.discrepancy.laws.scored_model import ScoredModel, score_term
 from impactcell.discrepancy.laws.standing import (
     SAMPLES,
@@ -27,6 +32,7 @@ from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
 from impactcell.discrepancy.search import (
     CandidateFit,
     CandidateScan,
+    Outdone,
     SearchContext,
     SelectionResult,
     compare_fits,
@@ -54,56 +60,68 @@ EFFECTS_PER_PLACE = 4
 MAX_P_VALUE = 0.05
 """Over the library, that a term alone lacks nothing [1]: held-out shots are asked as well."""
 
-MOST_UNASKED = 1.015
-"""RMS residual of the traces [noise floors] up to which a name that suffices is not held against free forms:
-right names have been seen to leave 1.009 at most where nothing else was wrong, another law's best likeness
-1.017 and more. Own choice."""
-SAMPLES_OF_LITTLE = 400
-"""Samples of a channel and shot that the competition reads where a name leaves as little [1]. Own choice."""
-
 
 def hold_against_free_forms(context: SearchContext, selection: SelectionResult) -> SelectionResult:
     """Let free forms compete with what a search has named, or has not, where something is left.
 
     Where a model of an effect and a term reaches the noise, that effect is named if no term alone does as
     well, with every effect tied that does as well beside a term of its own. Otherwise what the search has
-    found to stand out falls where a free form explains as much, and so does a single name that suffices but
-    for a little, where a form elsewhere explains more. What acts between shots is held against the
-    columns of `shots.csv` in any case.
+    found to stand out falls where a free form explains as much, and so does what suffices but for a little,
+    where a form in another place than its first name's explains more. What acts between shots is held
+    against the columns of `shots.csv` in any case.
     """
     return hold_against_columns(context, _hold_against_places(context, selection))
 
 
 def _hold_against_places(context: SearchContext, selection: SelectionResult) -> SelectionResult:
     """Let free forms in the traces compete, where something is left there."""
-    if not _asks(context, selection):
+    if not context.problem.shots.excitation.has_contact:
         return selection
-    nominal = selection.nominal.fit
-    problem = context.problem
-    suffices = selection.accepted is not None and not selection.remains
-    samples = SAMPLES_OF_LITTLE if suffices else SAMPLES
-    fewer = replace(context, coarse=Problem(decimate(problem.shots, samples), problem.batches))
-    forms = fit_free_forms(fewer, refit_shot_parameters(fewer.coarse, nominal))
+    if selection.accepted is None or selection.remains:
+        return _hold_what_leaves_something(context, selection)
+    if leaves_a_little(selection):
+        return _hold_what_leaves_a_little(context, selection)
+    return selection
+
+
+def _hold_what_leaves_something(context: SearchContext, selection: SelectionResult) -> SelectionResult:
+    fewer, forms = _forms_of(context, selection, SAMPLES)
     if not forms.alone:
         return selection
-    if not suffices and not any(LIBRARY[effect].kind is Kind.BETWEEN_SHOTS for effect in selection.added):
+    if not _acts_between_shots(selection):
         found = _told_beside_terms(fewer, forms)
         if found is not None:
             return _accept(context, selection, *found)
     outdone = outdone_by(fewer, selection, forms)
+    return selection if outdone is None else _rejected(selection, outdone)
+
+
+def _hold_what_leaves_a_little(context: SearchContext, selection: SelectionResult) -> SelectionResult:
+    """Let free forms compete with names that suffice; where these fall, others may show beside a term."""
+    fewer, forms = _forms_of(context, selection, SAMPLES_OF_LITTLE)
+    outdone = outdone_elsewhere(fewer, selection, forms)
     if outdone is None:
         return selection
+    found = _told_beside_terms(fewer, forms)
+    rejected = _rejected(selection, outdone)
+    return rejected if found is None else _accept(context, replace(rejected, outdone=None), *found)
+
+
+def _acts_between_shots(selection: SelectionResult) -> bool:
+    return any(LIBRARY[effect].kind is Kind.BETWEEN_SHOTS for effect in selection.added)
+
+
+def _forms_of(
+    context: SearchContext, selection: SelectionResult, samples: int
+) -> tuple[SearchContext, FreeForms]:
+    """Fit free forms to so many samples of each channel and shot."""
+    problem = context.problem
+    fewer = replace(context, coarse=Problem(decimate(problem.shots, samples), problem.batches))
+    return fewer, fit_free_forms(fewer, refit_shot_parameters(fewer.coarse, selection.nominal.fit))
+
+
+def _rejected(selection: SelectionResult, outdone: Outdone) -> SelectionResult:
     return replace(reject(selection.nominal, selection.final, selection.alternatives), outdone=outdone)
-
-
-def _asks(context: SearchContext, selection: SelectionResult) -> bool:
-    """Whether something is left in the traces of taps that a term may explain."""
-    if not context.problem.shots.excitation.has_contact:
-        return False
-    accepted = selection.accepted
-    if accepted is None or selection.remains:
-        return True
-    return len(selection.added) == 1 and float(np.mean(accepted.residual**2)) > MOST_UNASKED**2
 
 
 def _told_beside_terms(

@@ -173,11 +173,15 @@ def _is_contested(form: ScoredModel, named: ScoredModel, rough: Fit) -> bool:
 
 def _with_seconds(context: SearchContext, model: ScoredModel, forms: FreeForms) -> list[ScoredModel]:
     """Fit free forms beside a name or a form, those that promise most there."""
-    if model.effect:
-        problem, base = context.coarse.with_effects(model.fit.effects), model.fit
-    else:
-        problem, base = forms.terms[model.place].problem, forms.terms[model.place].fit
-    return with_second(context, problem, base, model.effect)
+    if not model.effect:
+        return seconds_beside_form(context, model, forms)
+    return with_second(context, context.coarse.with_effects(model.fit.effects), model.fit, model.effect)
+
+
+def seconds_beside_form(context: SearchContext, form: ScoredModel, forms: FreeForms) -> list[ScoredModel]:
+    """Fit free forms beside a form, those that promise most there."""
+    term = forms.terms[form.place]
+    return with_second(context, term.problem, term.fit, "")
 
 
 def stands_beside(context: SearchContext, named: ScoredModel, forms: FreeForms) -> bool:
