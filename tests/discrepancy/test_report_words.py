@@ -153,8 +153,78 @@ def test_nobody_is_asked_for_more_values_of_what_has_no_more(depends_on: tuple[s
         replicates=ReplicateSpread(0.01, 9),
         unexplained=SimpleNamespace(phase="free_slide", depends_on=depends_on),
         per_kilogram=False,
+        prepared=_prepared((1,) * 8 + (-1,) * 8),
     )
     assert sentences.next_step(result) == said
+
+
+def _prepared(directions: tuple[int, ...], batches: tuple[str, ...] = ("",)) -> Any:
+    return SimpleNamespace(
+        excitation=SimpleNamespace(has_contact=True, unit="shots"),
+        shots=tuple(SimpleNamespace(direction=direction) for direction in directions),
+        batches=batches,
+    )
+
+
+@pytest.mark.parametrize(
+    ("directions", "explained", "said", "german"),
+    [
+        ((1,) * 40, True, "about 22 taps from there: a tilt", "etwa 22 Stöße von dort: bis dahin"),
+        ((1,) * 32 + (-1,) * 8, True, "nothing more; the gap", "nichts weiter; ob es so"),
+        (
+            (1,) * 32 + (-1,) * 8,
+            False,
+            "about 10 more taps in direction -1, of which there are few",
+            "etwa 10 weitere Stöße in Richtung -1",
+        ),
+        (
+            (1,) * 24 + (-1,) * 16,
+            False,
+            "the same settings again; what remains is between the shots",
+            "dasselbe",
+        ),
+    ],
+)
+def test_taps_in_the_other_direction_are_asked_for_where_they_are_few(
+    directions: tuple[int, ...], explained: bool, said: str, german: str
+) -> None:
+    """All taps in one direction: a tilt of 8 mrad was friction 5 % off, and "nothing more" to be measured."""
+    result: Any = SimpleNamespace(
+        conclusion=SimpleNamespace(
+            verdict="no_gap" if explained else "unknown",
+            unconfirmed=(),
+            remaining=SimpleNamespace(explained=explained),
+        ),
+        replicates=ReplicateSpread(0.01, 9),
+        unexplained=None if explained else SimpleNamespace(phase="between_shots", depends_on=("direction",)),
+        per_kilogram=False,
+        prepared=_prepared(directions),
+    )
+    assert said in sentences.next_step(result)
+    assert german in german_sentences.next_step(result)
+
+
+@pytest.mark.parametrize(
+    ("batches", "said"),
+    [
+        (("",), "give the shots of each mass a batch of its own in shots.csv"),
+        (("a", "b"), "more values of mass, all else unchanged; what remains is between the shots"),
+    ],
+)
+def test_friction_that_goes_with_the_mass_is_asked_for_by_batches(
+    batches: tuple[str, ...], said: str
+) -> None:
+    """Six masses were there, and "more values of mass" was the advice: it led in a circle."""
+    result: Any = SimpleNamespace(
+        conclusion=SimpleNamespace(
+            verdict="unknown", unconfirmed=(), remaining=SimpleNamespace(explained=False)
+        ),
+        replicates=ReplicateSpread(0.01, 9),
+        unexplained=SimpleNamespace(phase="between_shots", depends_on=("mass",)),
+        per_kilogram=False,
+        prepared=_prepared((1, -1) * 8, batches),
+    )
+    assert said in sentences.next_step(result)
 
 
 def test_where_only_the_spread_between_shots_falls_no_gap_is_said_to_fall() -> None:

@@ -11,9 +11,8 @@ from impactcell.discrepancy.report.german_patterns import Patterns
 from impactcell.discrepancy.report.german_reasons import reason
 from impactcell.discrepancy.report.german_references import REFERENCES
 from impactcell.discrepancy.report.german_words import phrase
+from impactcell.discrepancy.report.next_step import Step, plan_next_step
 from impactcell.discrepancy.report.result import result_document
-from impactcell.discrepancy.report.sentences import NOT_SET
-from impactcell.discrepancy.search import UNTESTED
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.german.findings import german_equation as equation
 from impactcell.german.findings import german_headline, with_decimal_commas
@@ -56,9 +55,14 @@ _LABELS: Final = {
 }
 """Labels of the figures."""
 _SETTINGS: Final = (
-    (r"^weigh the part: .*",
-     "das Teil wiegen: kein Stoß unterscheidet seine Masse vom Maßstab des Kraftsensors"),
+    (r"^weigh the part: if .*",
+     "das Teil wiegen: wiegt es anders als angegeben, die Masse berichtigen, sonst die Skala des Sensors"),
+    (r"^weigh the part$", "das Teil wiegen"),
     (r"^load the force sensor .*", "den Kraftsensor mit einem bekannten Gewicht belasten"),
+    (r"^the same settings at a higher sampling rate: .*",
+     "dasselbe mit höherer Abtastrate: beim ersten Kontakt zeigt sie, was einen Kanal verspätet"),
+    (r"^level the table .*",
+     "den Tisch mit der Wasserwaage ausrichten und dasselbe noch einmal: was dann bleibt, ist keine Neigung"),
     (r"^repeat the campaign .*",
      "die Kampagne mit anderer Folge von Chargen, Richtungen und Ruhezeiten wiederholen"),
     (r"^the same settings again, column (.+) in another order$",
@@ -170,24 +174,37 @@ def advice(result: DiscrepancyResult) -> list[dict[str, Any]]:
 
 def next_step(result: DiscrepancyResult) -> str:
     """Say what to measure where no two effects have to be told apart."""
-    conclusion = result.conclusion
-    if conclusion.verdict == UNTESTED:
-        unit = phrase(result.prepared.excitation.unit)
-        return f"etwa {conclusion.missing_shots} {unit} mehr, mit Einstellungen wie diesen"
-    if result.per_kilogram:
-        return (
+    step = plan_next_step(result)
+    left = "zwischen den Stößen" if step.phase == "between_shots" else f"in der Phase {phrase(step.phase)}"
+    varied = " und ".join(phrase(name) for name in step.covariates)
+    unit = phrase(result.prepared.excitation.unit)
+    told = {
+        Step.MORE_SHOTS: f"etwa {step.shots} {unit} mehr, mit Einstellungen wie diesen",
+        Step.MASS: (
             "die Masse des Teils, die kein Gleiten zeigt: ohne sie kann keine Zelle mit diesem Modell laufen"
-        )
-    if sentences.lacks_replicates(result):
-        return "dasselbe noch einmal: wie weit Reibung zwischen gleichen Messungen streut, ist nicht bekannt"
-    if conclusion.remaining.explained:
-        return "nichts weiter; ob es so bleibt, zeigt die Abweichung auf der Seite der Zelle"
-    place = result.unexplained or next(iter(conclusion.remaining.where), None)
-    if place is None:
-        return "dasselbe noch einmal: Zurückgehaltenes sagt noch nicht, wo etwas bleibt"
-    varied = " und ".join(phrase(name) for name in place.depends_on if name not in NOT_SET)
-    what = f"mehr Werte von {varied}, alles andere unverändert" if varied else "dasselbe noch einmal"
-    return f"{what}; was bleibt, liegt in der Phase {phrase(place.phase)}"
+        ),
+        Step.REPLICATES: (
+            "dasselbe noch einmal: wie weit Reibung zwischen gleichen Messungen streut, ist nicht bekannt"
+        ),
+        Step.OTHER_DIRECTION: (
+            "nichts weiter für Stöße in dieser Richtung; wo auch vom anderen Ende gestoßen wird, etwa "
+            f"{step.shots} Stöße von dort: bis dahin gilt eine Neigung oder Asymmetrie als Reibung"
+        ),
+        Step.NOTHING: "nichts weiter; ob es so bleibt, zeigt die Abweichung auf der Seite der Zelle",
+        Step.PLACE: "dasselbe noch einmal: Zurückgehaltenes sagt noch nicht, wo etwas bleibt",
+        Step.MORE_OF_DIRECTION: (
+            f"etwa {step.shots} weitere Stöße in Richtung {step.direction:+d}, von denen es wenige gibt, "
+            f"zu diesen dazu; was bleibt, liegt {left} und hängt von der Richtung ab"
+        ),
+        Step.BATCHES: (
+            "noch nichts Neues: den Stößen jeder Masse in shots.csv eine eigene Charge geben und dies noch "
+            "einmal laufen lassen; was bleibt, liegt zwischen den Stößen und hängt von der Masse ab, und "
+            "jede Charge hat ihre eigene Reibung"
+        ),
+        Step.VALUES: f"mehr Werte von {varied}, alles andere unverändert; was bleibt, liegt {left}",
+        Step.SAME: f"dasselbe noch einmal; was bleibt, liegt {left}",
+    }
+    return told[step.step]
 
 
 def split_sentence(result: DiscrepancyResult) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from impactcell.discrepancy.data import BETWEEN_SHOTS
 from impactcell.discrepancy.model import ParameterEstimate
-from impactcell.discrepancy.report.sentences import headline
+from impactcell.discrepancy.report.sentences import headline, next_step
 from impactcell.discrepancy.search import (
     Gap,
     GapChange,
@@ -80,6 +80,7 @@ def result_document(result: DiscrepancyResult) -> dict[str, Any]:
         "simulation": _simulation(result.simulation),
         **_law(result),
         "next_experiment": experiments(result.experiments),
+        "measure_next": None if result.experiments else next_step(result),
         "nominal": _nominal([estimate for estimate in result.stated_parameters if not estimate.effect]),
         "noise_floor": {
             "noise_std": [round_digits(value) for value in result.floor.noise_std],

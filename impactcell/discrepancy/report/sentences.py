@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from impactcell.discrepancy.data import CHANNELS
+from impactcell.discrepancy.report.next_step import Step, lacks_replicates, plan_next_step
 from impactcell.discrepancy.search import NO_GAP, UNTESTED, Remaining, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.german.findings import enumerated
@@ -13,9 +14,6 @@ from impactcell.physics.effect_names import as_title, in_words
 from impactcell.physics.effects import LIBRARY, OF_PRODUCT, find_effect
 from impactcell.physics.free_column_forms import printed
 from impactcell.physics.free_form import FreeForm
-
-NOT_SET = frozenset({"direction", "order"})
-"""Covariates of which there are no more values to set: a shot goes one way or the other, and has its turn."""
 
 
 def phrase(identifier: str) -> str:
@@ -120,22 +118,33 @@ def advice(result: DiscrepancyResult) -> list[dict[str, Any]]:
 
 def next_step(result: DiscrepancyResult) -> str:
     """Say what to measure where no two effects have to be told apart."""
-    conclusion = result.conclusion
-    if conclusion.verdict == UNTESTED:
-        unit = result.prepared.excitation.unit
-        return f"about {conclusion.missing_shots} {unit} more, at settings like these"
-    if result.per_kilogram:
-        return "the mass of the part, which no slide shows: without it no cell can run with this model"
-    if lacks_replicates(result):
-        return "the same settings again: how far friction scatters between shots alike is not known"
-    if conclusion.remaining.explained:
-        return "nothing more; the gap on the cell's page shows whether it stays so"
-    place = result.unexplained or next(iter(conclusion.remaining.where), None)
-    if place is None:
-        return "the same settings again: held-out shots do not say yet where something remains"
-    varied = " and ".join(phrase(name) for name in place.depends_on if name not in NOT_SET)
-    what = f"more values of {varied}, all else unchanged" if varied else "the same settings again"
-    return f"{what}; what remains is in {phrase(place.phase)}"
+    step = plan_next_step(result)
+    left = "between the shots" if step.phase == "between_shots" else f"in {phrase(step.phase)}"
+    varied = " and ".join(phrase(name) for name in step.covariates)
+    told = {
+        Step.MORE_SHOTS: f"about {step.shots} {result.prepared.excitation.unit} more, at settings like these",
+        Step.MASS: "the mass of the part, which no slide shows: without it no cell can run with this model",
+        Step.REPLICATES: (
+            "the same settings again: how far friction scatters between shots alike is not known"
+        ),
+        Step.OTHER_DIRECTION: (
+            "nothing more for taps in this direction; where the part is tapped from the other end as well, "
+            f"about {step.shots} taps from there: a tilt or an asymmetry passes for friction until then"
+        ),
+        Step.NOTHING: "nothing more; the gap on the cell's page shows whether it stays so",
+        Step.PLACE: "the same settings again: held-out shots do not say yet where something remains",
+        Step.MORE_OF_DIRECTION: (
+            f"about {step.shots} more taps in direction {step.direction:+d}, of which there are few, "
+            f"added to these; what remains is {left} and goes with the direction"
+        ),
+        Step.BATCHES: (
+            "nothing new yet: give the shots of each mass a batch of its own in shots.csv, and run this "
+            "again; what remains is between the shots and goes with the mass, and each batch has its friction"
+        ),
+        Step.VALUES: f"more values of {varied}, all else unchanged; what remains is {left}",
+        Step.SAME: f"the same settings again; what remains is {left}",
+    }
+    return told[step.step]
 
 
 def split_sentence(result: DiscrepancyResult) -> str:
@@ -190,13 +199,6 @@ def law_sentences(result: DiscrepancyResult) -> dict[str, Any] | None:
         "file": None if law is None else f"{law.identifier}.py",
         "parameters": [(one.parameter, one, units[one.parameter]) for one in finding.estimates],
     }
-
-
-def lacks_replicates(result: DiscrepancyResult) -> bool:
-    """Whether no setting was repeated, and what is not confirmed acts between shots."""
-    unconfirmed = result.conclusion.unconfirmed
-    acts_between = [find_effect(name).kind is Kind.BETWEEN_SHOTS for name in unconfirmed]
-    return math.isnan(result.replicates.spread) and bool(unconfirmed) and all(acts_between)
 
 
 def _outdone(result: DiscrepancyResult) -> str:

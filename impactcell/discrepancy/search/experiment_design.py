@@ -35,6 +35,8 @@ MAX_SIMULATED_SETTINGS = 3
 """Settings, the cheapest first, that are simulated until one keeps what it promises."""
 SIMULATION = 9
 """Stream of random numbers of these shots, apart from those of other draws."""
+LATE_CHANNELS = frozenset({"force_sensor_lag", "channel_skew", "position_sensor_lag"})
+"""Effects that make a channel late: no weight at rest shows them."""
 UNLIMITED = CellLimits()
 """Limits of a cell of which nothing is known."""
 
@@ -181,9 +183,19 @@ def _separate_measurement(effect: str, rival: str) -> str:
     kinds = {LIBRARY[effect].kind, LIBRARY[rival].kind}
     names = {effect, rival}
     if "mass_error" in names:
-        return "weigh the part: no shot can tell its mass from the scale of the force sensor"
+        return (
+            "weigh the part: if it weighs other than told, correct its mass, else the force sensor's scale"
+            if "force_sensor_gain" in names
+            else "weigh the part"
+        )
+    if names & LATE_CHANNELS:
+        return (
+            "the same settings at a higher sampling rate: at first contact it shows what makes a channel late"
+        )
     if Kind.SENSOR in kinds:
         return "load the force sensor with a known weight: no shot tells its error from the plant's own"
+    if "surface_tilt" in names and Kind.BETWEEN_SHOTS in kinds:
+        return "level the table with a spirit level, and do the same again: what is left then is no tilt"
     if Kind.BETWEEN_SHOTS in kinds:
         return "repeat the campaign in another order of batches, directions and dwells"
     if Kind.ACTUATOR in kinds:
