@@ -194,7 +194,7 @@ def test_in_its_place_a_form_outdoes_a_name_only_where_it_keeps_ahead_with_a_sec
     fit: Any = SimpleNamespace(effects=("friction_patch",), residual=np.ones(10))
     context: Any = SimpleNamespace(coarse=SimpleNamespace(with_effects=lambda _effects: None))
     term: Any = SimpleNamespace(problem=None, fit=None)
-    given: Any = SimpleNamespace(accepted=fit, nominal=None, remains=True)
+    given: Any = SimpleNamespace(accepted=fit, nominal=None)
     seconds = (
         _scored("friction_patch", elsewhere, 1.4, beside_name), _scored("", elsewhere, 1.2, beside_form)
     )  # fmt: skip
@@ -233,7 +233,7 @@ def test_a_name_between_shots_falls_to_a_form_that_narrows_the_factors_as_much_f
     )
     form = ScoredModel("", "free_force_over_position", fit, np.zeros(20), 1.0, numbers)
     context: Any = SimpleNamespace(coarse=SimpleNamespace(count=20, shots=None))
-    selection: Any = SimpleNamespace(accepted=named, nominal=None, remains=True)
+    selection: Any = SimpleNamespace(accepted=named, nominal=None)
     with (
         patch("impactcell.discrepancy.laws.standing.refine", lambda *_: [named]),
         patch("impactcell.discrepancy.laws.standing.chance_of_order", lambda *_: chance),

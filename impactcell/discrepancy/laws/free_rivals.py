@@ -16,6 +16,7 @@ from impactcell.discrepancy.laws.column_rivals import hold_against_columns
 from impactcell.discrepancy.laws.free_term import FreeTerm, candidate_terms
 from impactcell.discrepancy.laws.nearly_sufficient import (
     SAMPLES_OF_LITTLE,
+    acts_between_shots,
     leaves_a_little,
     outdone_elsewhere,
 )
@@ -43,8 +44,6 @@ from impactcell.discrepancy.search import (
     scan_candidates,
     screen,
 )
-from impactcell.physics import Kind
-from impactcell.physics.effects import LIBRARY
 from impactcell.physics.free_form import FreeForm
 from impactcell.physics.free_forms import FINER
 from impactcell.physics.remainder_forms import REMAINDER_FORMS
@@ -88,7 +87,7 @@ def _hold_what_leaves_something(context: SearchContext, selection: SelectionResu
     fewer, forms = _forms_of(context, selection, SAMPLES)
     if not forms.alone:
         return selection
-    if not _acts_between_shots(selection):
+    if not acts_between_shots(selection):
         found = _told_beside_terms(fewer, forms)
         if found is not None:
             return _accept(context, selection, *found)
@@ -105,10 +104,6 @@ def _hold_what_leaves_a_little(context: SearchContext, selection: SelectionResul
     found = _told_beside_terms(fewer, forms)
     rejected = _rejected(selection, outdone)
     return rejected if found is None else _accept(context, replace(rejected, outdone=None), *found)
-
-
-def _acts_between_shots(selection: SelectionResult) -> bool:
-    return any(LIBRARY[effect].kind is Kind.BETWEEN_SHOTS for effect in selection.added)
 
 
 def _forms_of(

@@ -137,9 +137,7 @@ def outdone_by(context: SearchContext, selection: SelectionResult, forms: FreeFo
         )
         rival = next(rivals, None)
     else:
-        rival = _outdoing(context, named, forms)
-        if rival is None and selection.remains:
-            rival = _another_law(context, named, forms)
+        rival = _outdoing(context, named, forms) or _another_law(context, named, forms)
     return None if rival is None else Outdone(effect, rival.place, is_in_its_place(effect, rival.place))
 
 
@@ -165,10 +163,13 @@ def _outdoing(context: SearchContext, named: ScoredModel, forms: FreeForms) -> S
 
 
 def _is_contested(form: ScoredModel, named: ScoredModel, rough: Fit) -> bool:
-    """Whether it is open if a spline outdoes a name: not where it closes much more, or it alone all."""
+    """Whether it is open if a spline outdoes a name: not where it closes much more, or all from elsewhere.
+
+    Where both close all, it is.
+    """
     is_near = form.place in REMAINDER_FORMS and closes_enough(form, named, rough)
-    closes_all_alone = form.leaves_nothing and not named.leaves_nothing
-    return is_near and (is_in_its_place(named.effect, form.place) or not closes_all_alone)
+    is_open = is_in_its_place(named.effect, form.place) or named.leaves_nothing or not form.leaves_nothing
+    return is_near and is_open
 
 
 def _with_seconds(context: SearchContext, model: ScoredModel, forms: FreeForms) -> list[ScoredModel]:

@@ -14,7 +14,7 @@ NOT_SET = frozenset({"direction", "order"})
 """Covariates of which there are no more values to set: a shot goes one way or the other, and has its turn."""
 ENOUGH_OF_A_DIRECTION = 0.35
 """Share of the taps from which on those of a direction are enough: 8 of 40 left a tilt unconfirmed that 16
-named. Own choice."""
+named [1]. Own choice."""
 
 
 class Step(enum.Enum):
@@ -65,7 +65,7 @@ def plan_next_step(result: DiscrepancyResult) -> NextStep:
         return NextStep(Step.REPLICATES)
     scarce, count = _scarce_direction(result)
     if conclusion.remaining.explained:
-        is_unseen = scarce and all(shot.direction != scarce for shot in result.prepared.shots)
+        is_unseen = scarce != 0 and scarce not in {shot.direction for shot in result.prepared.shots}
         return NextStep(Step.OTHER_DIRECTION, count, scarce) if is_unseen else NextStep(Step.NOTHING)
     place = result.unexplained or next(iter(conclusion.remaining.where), None)
     if place is None:
