@@ -249,4 +249,4 @@ def test_a_mass_that_is_absurdly_off_explains_nothing(off: float, names: list[st
     parts = machine_parts(base, is_driven=True)
     known = fits.priors, fits.nonnegative
     columns = fits.columns(fits.base_terms)
-    assert [*parts_that_may_be_off(training, columns, parts, known)] == names
+    assert [*parts_that_may_be_off(training, columns, parts, known, 0.0)] == names

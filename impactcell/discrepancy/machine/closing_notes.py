@@ -6,26 +6,15 @@ from dataclasses import replace
 import numpy as np
 
 from impactcell.campaign import COLUMNS
+from impactcell.discrepancy.machine.better_simulated import best_simulated
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
-from impactcell.discrepancy.machine.open_loop_error import BetterSimulation
 from impactcell.discrepancy.machine.regression.held_number import DELAY
-from impactcell.discrepancy.machine.regression.trials import ChosenTerm
-from impactcell.discrepancy.machine.simulation.held_out import STEPS_PER_PERIOD, simulate_held_out
 from impactcell.discrepancy.machine.terms.base_model import Response
 from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import POOR_FIT_PERCENT
 from impactcell.physics.effect_names import in_words
 
-MUCH_BETTER = 0.5
-"""Share of the base model's error that the simulation with a term may leave for the term to be told. Our
-choice."""
-MOST_STEPS = 50_000
-"""Steps of simulations by which terms are tried, all together: of long records those that fit best [1]."""
-LEAST_TRIED = 3
-"""Terms that are tried however long the records are. Our choice."""
-MOST_TOLD = 3
-"""Terms that are told at most. Our choice."""
 REST_SHARE = 0.1
 """Share of a record's motion below which what is held out of it is called at rest. Our choice."""
 FOLLOWS_PERCENT = 90.0
@@ -37,7 +26,7 @@ which neighbours share much: correlated by 0.7 it is 2.4 times what they show. O
 
 def with_closing_notes(fits: MachineFits, finding: MachineFinding) -> MachineFinding:
     """Say which term simulates far better where none is established, and what else goes by the outcome."""
-    better = _best_simulated(fits, finding)
+    better = best_simulated(fits, finding)
     notes = [*finding.notes, *_note_of_delay(finding)]
     if better is None:
         notes += _note_of_wandering(finding)
@@ -53,44 +42,6 @@ def with_closing_notes(fits: MachineFits, finding: MachineFinding) -> MachineFin
             f"({sensor}), would show it in blocks."
         )
     return replace(finding, notes=tuple(notes), better_simulated=better)
-
-
-def _best_simulated(fits: MachineFits, finding: MachineFinding) -> BetterSimulation | None:
-    """Give terms with which the held-out simulation errs half as much or less, the best first."""
-    explained = finding.established or finding.law is not None or finding.number_off
-    if explained or not finding.errs_beyond_noise:
-        return None
-    errors: dict[str, float] = {}
-    for term in _tried(fits, finding):
-        model = fits.fit((*finding.nominal.terms, term), settle=False)
-        if any(model.value(column) for column in term.columns):
-            errors[term.choice.name] = simulate_held_out(finding, model).rmse
-    most = MUCH_BETTER * finding.simulated[-1].rmse
-    names = sorted((name for name, rmse in errors.items() if rmse <= most), key=errors.__getitem__)
-    return BetterSimulation(tuple(names[:MOST_TOLD]), errors[names[0]]) if names else None
-
-
-def _tried(fits: MachineFits, finding: MachineFinding) -> list[ChosenTerm]:
-    """Terms of the catalogue but those by columns, as many as may be simulated: what fits best first.
-
-    With the shapes that the search gave them; where there were too few blocks for it those that have none.
-    """
-    grids = fits.grids
-    terms = [
-        ChosenTerm(choice, grids[choice.name][0])
-        for choice in fits.candidates
-        if len(grids[choice.name]) == 1
-    ]
-    if finding.steps:
-        terms = [trial.term for trial in finding.steps[0].trials]
-    longest_s = max(end - begin for _, begin, end in finding.held_spans)
-    step_s = min(record.step_s for record in finding.records)
-    steps = longest_s / min(step_s, finding.scale.period_s / STEPS_PER_PERIOD)
-    most = max(int(MOST_STEPS / steps), LEAST_TRIED)
-    if not finding.missing_blocks and finding.is_at_floor:  # any term may help a gravity that is a little off
-        clear = {one.name for one in finding.clear_strengths}
-        terms = [term for term in terms if term.choice.name in clear]
-    return [term for term in terms if not term.choice.covariate][:most]
 
 
 def _note_of_rest(finding: MachineFinding) -> list[str]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from impactcell.campaign import Coordinate
+from impactcell.discrepancy.machine.better_simulated import errors_with_terms
 from impactcell.discrepancy.machine.establishing import establish
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
@@ -20,7 +21,8 @@ from impactcell.german.findings import enumerated
 from impactcell.german.open_loop import POOR_FIT_PERCENT
 
 MOST_LEFT = 0.5
-"""Error of the held-out simulation over that with the columns as they are, up to which a slip is told. Our
+"""Error of the held-out simulation with a slip, over the least that it has with the columns as they are (by
+the base model, with a term of the catalogue beside it, without the drive), up to which a slip is told. Our
 choice."""
 FOLLOWED_PERCENT = 90.0
 """Fit of a simulation from which on no column is turned or a thousand times too large. Our choice."""
@@ -93,6 +95,8 @@ ROTATION = (
 """Units that a rotation may have where something drives it."""
 DEGREES = ColumnSlip("angle_rad in degrees", position=DEGREE)
 """Unit of any rotation."""
+UNDRIVEN = ColumnSlip("no drive", force=1e-9)
+"""No slip: records that are followed with it go on by themselves, as a motor that has come to its speed."""
 
 
 def slip_in_columns(fits: MachineFits, finding: MachineFinding) -> ColumnSlip | None:
@@ -111,7 +115,23 @@ def slip_in_columns(fits: MachineFits, finding: MachineFinding) -> ColumnSlip | 
         if (fit := _fit_percent(fits, slip, finding.seed)) >= POOR_FIT_PERCENT
     ]
     best = min(tried, key=lambda slip: slip.error, default=None)
-    return best if best is not None and best.error <= MOST_LEFT else None
+    if best is None or best.error > MOST_LEFT:
+        return None
+    return best if best.error <= MOST_LEFT * _least_error_as_it_is(fits, finding, best) else None
+
+
+def _least_error_as_it_is(fits: MachineFits, finding: MachineFinding, slip: ColumnSlip) -> float:
+    """Error of the held-out simulation, over the base model's, by what needs no column to be another.
+
+    A force of nearly nothing and an inertia of any size beside it follow whatever moves on by itself, and a
+    wrong unit may look like the term that is missing. That small angles in degrees look like those on a
+    spring is no reason to take them for it.
+    """
+    now = finding.simulated[-1]
+    least = min(1.0, (100.0 - _fit_percent(fits, UNDRIVEN, finding.seed)) / (100.0 - now.fit_percent))
+    if slip == replace(DEGREES, error=slip.error):
+        return least
+    return min([least, *(rmse / now.rmse for rmse in errors_with_terms(fits, finding).values())])
 
 
 def told_of_slip(

@@ -32,10 +32,12 @@ from impactcell.discrepancy.machine.search.look_alikes import (
     machine_parts,
     parts_that_may_be_off,
 )
+from impactcell.discrepancy.machine.search.pairs import select_pair
 from impactcell.discrepancy.machine.search.selection import SelectionStep, select_terms
 from impactcell.discrepancy.machine.search.shape_ends import with_ends_named
 from impactcell.discrepancy.machine.search.ties import needed_as_much, still_tied
 from impactcell.discrepancy.machine.terms.base_model import TermChoice
+from impactcell.discrepancy.search import MAX_EXPECTED_GAP
 
 WEIGHINGS = 2
 """Rounds of weights by what a model leaves, and of a model by these weights, at least [1]."""
@@ -59,12 +61,18 @@ class _Proof(NamedTuple):
 
 
 def establish(
-    fits: MachineFits, notes: list[str], seed: int, contradicted: frozenset[str] = frozenset()
+    fits: MachineFits,
+    notes: list[str],
+    seed: int,
+    contradicted: frozenset[str] = frozenset(),
+    *,
+    with_pairs: bool = True,
 ) -> MachineFinding:
     """Select on training blocks, prove on held-out ones.
 
     `contradicted` are names of terms that join no model, nor what was found beside them: a simulation errs
-    more with them.
+    more with them. Two that explain only together what is missing are taken `with_pairs`, if they leave
+    nothing.
 
     The rows are weighed by what the base model leaves of them while terms are looked for; what is found is
     proved once more with weights by its own remainder, so that gaps before and after have the same ones; but
@@ -79,12 +87,14 @@ def establish(
     training, held_out = fits.blocks()
     steps: list[SelectionStep] = []
     candidates: list[TermChoice] = []
+    before_notes, pair = notes, None
     enough = MachineFinding.enough(training, held_out)
     numbers = numbers_held(fits.base, fits.records, fits.scale)
     if enough:
         parts = machine_parts(fits.base, is_driven=any(record.force.any() for record in fits.records))
         known = fits.priors, fits.nonnegative
-        parts = parts_that_may_be_off(training, fits.columns(base_terms), parts, known)
+        stated = fits.base.gravity_torque.value
+        parts = parts_that_may_be_off(training, fits.columns(base_terms), parts, known, stated)
         candidates = [
             choice
             for choice in fits.candidates
@@ -93,6 +103,9 @@ def establish(
         notes = [*notes, *alike_note(fits.candidates, candidates, parts)]
         search = replace(_search(fits, training, candidates), smooth_force=fits.smooth_force(candidates))
         steps = select_terms(search, fits.columns(base_terms))
+        if with_pairs and steps and steps[0].accepted is None:
+            pair = select_pair(search, fits.columns(base_terms), steps[0])
+            steps = list(pair or steps)
         for number in numbers:
             steps = told_from_number(search, fits.columns(base_terms), steps, number)
         steps = with_ends_named(steps, fits.shapes, fits.base.coordinate)
@@ -109,6 +122,8 @@ def establish(
             break
     models, falls = proof.models, proof.falls
     training, held_out = fits.blocks()
+    if pair is not None and (len(falls) < len(pair) or gap(training, models[-1]) > MAX_EXPECTED_GAP):
+        return establish(fits, before_notes, seed, contradicted, with_pairs=False)
     if falls:
         now = replace(_search(fits, training, candidates), smooth_force=fits.smooth_force(candidates))
         steps = _with_ties_of_now(now, fits.columns(base_terms), steps)
@@ -207,8 +222,9 @@ def _with_ties_of_now(
         needed: tuple[str, ...] = ()
         if best is not None:
             numbers = [name for name in tied if name not in search.shapes]
-            tied = still_tied(search, columns, best, tied) if tied else ()
-            needed = tuple(name for name in needed_as_much(search, columns, best) if name not in tied)
+            own = [*columns, *(step.pair.columns if step.pair is not None else ())]
+            tied = still_tied(search, own, best, tied) if tied else ()
+            needed = tuple(name for name in needed_as_much(search, own, best) if name not in tied)
             tied = (*tied, *needed, *numbers)
         told.append(replace(step, tied_with=tied, needed_as_much=needed))
         columns = [*columns, *(best.term.columns if best is not None else ())]

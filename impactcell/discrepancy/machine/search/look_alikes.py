@@ -46,11 +46,13 @@ def parts_that_may_be_off(
     columns: Sequence[Column],
     parts: Mapping[str, Column],
     known: tuple[Mapping[Column, NumberPrior], frozenset[Column]],
+    gravity: float,
 ) -> dict[str, Column]:
     """Give the parts of a machine by which an error may explain what a model leaves.
 
     Of a spring that bends as q³ is what moves a light damped part, but a mass that had to be nought for it
-    explains nothing: what looks like such a mass is to be looked for.
+    explains nothing: what looks like such a mass is to be looked for. So is what looks like a drive that
+    would have to be nought: of a motor at its final speed all torque goes into viscous friction.
 
     Parameters
     ----------
@@ -61,15 +63,21 @@ def parts_that_may_be_off(
         As `machine_parts` gives them.
     known : (mapping, frozenset)
         Priors of the nuisances, and strengths that may not be negative.
+    gravity : float
+        Torque of gravity that the base model states [N m].
     """
-    mass = parts.get("inertia")
-    if mass is None:
-        return dict(parts)
     priors, nonnegative = known
-    others = [column for column in columns if column != mass]
-    free = {column: prior for column, prior in priors.items() if column != mass}
-    error = float(fit_blocks(blocks, [*others, mass], free, nonnegative).coefficients[-1])
-    return {name: part for name, part in parts.items() if part != mass or abs(error) <= FARTHEST_SHARE}
+    sizes = {"inertia": 1.0, "drive": 1.0, "gravity": abs(gravity)}
+
+    def is_possible(name: str, part: Column) -> bool:
+        if not sizes.get(name):
+            return True
+        others = [column for column in columns if column != part]
+        free = {column: prior for column, prior in priors.items() if column != part}
+        error = float(fit_blocks(blocks, [*others, part], free, nonnegative).coefficients[-1])
+        return abs(error) <= FARTHEST_SHARE * sizes[name]
+
+    return {name: part for name, part in parts.items() if is_possible(name, part)}
 
 
 def like_the_machine(blocks: Blocks, term: ChosenTerm, parts: Iterable[Column], base: BaseModel) -> bool:

@@ -76,6 +76,8 @@ class SelectionStep:
         (logarithm).
     needed_as_much : tuple of str
         Those that are tied by what records need alone: blocks tell them from the accepted one.
+    pair : ChosenTerm or None
+        Term of the next step, beside which this one was looked for.
     """
 
     trials: tuple[Trial, ...]
@@ -88,6 +90,7 @@ class SelectionStep:
     beside: str = ""
     needs: Mapping[str, float] = field(default_factory=dict)
     needed_as_much: tuple[str, ...] = ()
+    pair: ChosenTerm | None = None
 
     @property
     def note(self) -> str:
@@ -104,7 +107,7 @@ def select_terms(search: TermSearch, columns: Sequence[Column]) -> list[Selectio
     columns = list(columns)
     remaining = list(search.candidates)
     while remaining:
-        step = _step(search, columns, remaining)
+        step = select_one(search, columns, remaining)
         if steps and step.accepted is not None and not _is_second(search, columns, step.accepted):
             refused = "beside a remainder one term is named at most"
             step = replace(step, accepted=None, tied_with=(), reason=refused)
@@ -122,7 +125,11 @@ def _is_second(search: TermSearch, columns: Sequence[Column], trial: Trial) -> b
     return is_closed and search.gap(columns) >= MIN_SECOND_GAP
 
 
-def _step(search: TermSearch, columns: list[Column], candidates: Sequence[TermChoice]) -> SelectionStep:
+def select_one(
+    search: TermSearch, columns: Sequence[Column], candidates: Sequence[TermChoice]
+) -> SelectionStep:
+    """Look for the one term that is missing beside a model."""
+    columns = list(columns)
     before = search.losses(columns)
     excess = max(float(before.sum() - search.blocks.noise.sum()), 0.0)
     trials = sorted(
