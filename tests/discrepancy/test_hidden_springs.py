@@ -240,7 +240,7 @@ def test_a_spring_that_only_bends_as_a_cube_is_no_error_of_the_mass() -> None:
 
 
 @pytest.mark.parametrize(
-    ("off", "names"), [(0.1, ["inertia", "drive", "a constant force"]), (2.0, ["drive", "a constant force"])]
+    ("off", "names"), [(0.1, ["inertia", "drive", "a constant force"]), (2.0, ["a constant force"])]
 )
 def test_a_mass_that_is_absurdly_off_explains_nothing(off: float, names: list[str]) -> None:
     base = replace(AXIS, inertia=NumberPrior(AXIS.inertia.value * (1.0 + off)))

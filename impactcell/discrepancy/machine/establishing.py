@@ -28,6 +28,7 @@ from impactcell.discrepancy.machine.search.explained_by_numbers import (
 from impactcell.discrepancy.machine.search.held_numbers import numbers_held, told_from_number
 from impactcell.discrepancy.machine.search.look_alikes import (
     alike_note,
+    is_over_load,
     like_the_machine,
     machine_parts,
     parts_that_may_be_off,
@@ -91,16 +92,19 @@ def establish(
     enough = MachineFinding.enough(training, held_out)
     numbers = numbers_held(fits.base, fits.records, fits.scale)
     if enough:
-        parts = machine_parts(fits.base, is_driven=any(record.force.any() for record in fits.records))
+        every = machine_parts(fits.base, is_driven=any(record.force.any() for record in fits.records))
         known = fits.priors, fits.nonnegative
         stated = fits.base.gravity_torque.value
-        parts = parts_that_may_be_off(training, fits.columns(base_terms), parts, known, stated)
+        parts = parts_that_may_be_off(training, fits.columns(base_terms), every, known, stated)
+        # Friction over the load is itself a share of the drive, and as absurd where that would be nought.
         candidates = [
             choice
             for choice in fits.candidates
-            if not _is_like_the_machine(fits, training, choice, parts.values())
+            if not _is_like_the_machine(
+                fits, training, choice, (every if is_over_load(choice) else parts).values()
+            )
         ]
-        notes = [*notes, *alike_note(fits.candidates, candidates, parts)]
+        notes = [*notes, *alike_note(fits.candidates, candidates, every)]
         search = replace(_search(fits, training, candidates), smooth_force=fits.smooth_force(candidates))
         steps = select_terms(search, fits.columns(base_terms))
         if with_pairs and steps and steps[0].accepted is None:

@@ -12,6 +12,7 @@ from impactcell.discrepancy.machine.regression.trials import ChosenTerm
 from impactcell.discrepancy.machine.regression.weak_form import Column
 from impactcell.discrepancy.machine.search.held_numbers import FARTHEST_SHARE
 from impactcell.discrepancy.machine.terms.base_model import BaseModel, NumberPrior, TermChoice
+from impactcell.discrepancy.machine.terms.rival_forms import PLACES
 from impactcell.german.findings import enumerated
 from impactcell.physics.effect_names import in_words
 
@@ -78,6 +79,11 @@ def parts_that_may_be_off(
         return abs(error) <= FARTHEST_SHARE * sizes[name]
 
     return {name: part for name, part in parts.items() if is_possible(name, part)}
+
+
+def is_over_load(choice: TermChoice) -> bool:
+    """Whether a term is friction over what acts on the part beside it."""
+    return PLACES.get(choice.identifier) == "friction_over_load"
 
 
 def like_the_machine(blocks: Blocks, term: ChosenTerm, parts: Iterable[Column], base: BaseModel) -> bool:
