@@ -12,6 +12,7 @@ from impactcell.campaign import write as write_directory
 from impactcell.errors import CampaignError, MeasurementError
 from impactcell.measurements.columns.given_values import Given
 from impactcell.measurements.columns.mapping import Mapping
+from impactcell.measurements.columns.motion_signals import note_of_drive, ways_from_signals
 from impactcell.measurements.columns.recognition import CHANNELS, ColumnMeaning
 from impactcell.measurements.columns.repeated_rows import without_repeats
 from impactcell.measurements.faults import raise_faults
@@ -27,7 +28,7 @@ from impactcell.measurements.records.stated_constants import (
 from impactcell.measurements.table import Table
 from impactcell.measurements.taps.captures import channel_of, described, direction_of, shot_numbers
 from impactcell.measurements.taps.cutting import taps_of
-from impactcell.measurements.taps.excitation import SWAPPED, excitation_of, looks_swapped
+from impactcell.measurements.taps.excitation import SWAPPED, excitation_of, looks_swapped, notes_of_swings
 from impactcell.quality import Fault, copies, inspect_campaign, notes_of, refuse_unusable
 from impactcell.records import Capture, Channel, Samples
 
@@ -70,10 +71,12 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     notes = [*notes_of_rows, *notes_of_recorders, *notes_of_stated(tables, records, mapping)]
     excitation = given.excitation or excitation_of(records, notes)
     _check_channels(records, mapping, excitation)
+    coordinate = _coordinate(mapping, excitation)
     notes += _of_sums(mapping, excitation)
+    notes += note_of_drive(mapping.assignments) if excitation is Excitation.FREE_SLIDE else []
+    notes += (of_swings := notes_of_swings(records, excitation, coordinate))
     check_scalars_alike(tables, mapping, excitation)
     notes += left_empty(tables, records, mapping)
-    coordinate = _coordinate(mapping, excitation)
     if excitation is Excitation.TAP:
         refuse_unread_velocity(tables, records, mapping)
         captures, notes_of_taps = taps_of(records, given)
@@ -110,8 +113,8 @@ def make_campaign(tables: Sequence[Table], mapping: Mapping) -> Imported:
     try:
         refuse_unusable(campaign, data_faults)
     except CampaignError as error:
-        told = SWAPPED if is_swapped else error
-        raise MeasurementError(f"{records[0].place}: {told}") from error
+        told = [SWAPPED] if is_swapped else [str(error), *of_swings]
+        raise MeasurementError("\n".join(f"{records[0].place}: {fault}" for fault in told)) from error
     return Imported(campaign, (*notes, *notes_of(data_faults)))
 
 
@@ -206,12 +209,10 @@ def _check_channels(records: Sequence[Record], mapping: Mapping, excitation: Exc
 
 def _way_to_channel(mapping: Mapping) -> str:
     """Say how what is needed can be given."""
-    speed = mapping.of(ColumnMeaning.VELOCITY)
-    if speed is not None and mapping.of(ColumnMeaning.POSITION) is None:
-        return (
-            f"where {speed.column!r} is the speed of what moves, --column 'position={speed.column}' sums it "
-            f"up; else name the column, as with --column position=NAME"
-        )
+    channels = (ColumnMeaning.POSITION, ColumnMeaning.FORCE)
+    lacking = [meaning for meaning in channels if mapping.of(meaning) is None]
+    if lacking and (ways := ways_from_signals(mapping.assignments, lacking)):
+        return f"{'; '.join(ways)}; else name the column, as with --column {lacking[0]}=NAME"
     return "name the column, as with --column force=NAME, or say another --excitation"
 
 

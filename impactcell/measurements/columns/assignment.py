@@ -15,6 +15,7 @@ from impactcell.measurements.columns.recognition import (
     WORD_MATCH,
     ColumnMeaning,
     name_score,
+    rate_name,
 )
 from impactcell.measurements.columns.sampling_step import doubt_of_step, sampling_step_s
 from impactcell.measurements.notation.gains import SIGNALS
@@ -25,8 +26,12 @@ from impactcell.records import Samples
 
 SURE = 0.5
 """Confidence from which on a guess is used without being confirmed."""
+UNSURE = 0.35
+"""Confidence of the first of several columns that may be the same quantity."""
 MEASURED_CHANGES = 0.1
 """Share of a column's samples that differ from the one before, beyond which it was measured."""
+OF_MOTION = (*CHANNELS, ColumnMeaning.VELOCITY, ColumnMeaning.MASS)
+"""Quantities whose unit is another one where what moves turns."""
 UNITLESS = (
     ColumnMeaning.SHOT,
     ColumnMeaning.DIRECTION,
@@ -37,7 +42,6 @@ UNITLESS = (
 """Quantities that need no unit."""
 ASCENDING_SHARE = 0.8
 """Share of steps forward from which on a column may be a time: it begins anew with each shot of a file."""
-
 TURN_ROUND = "turn the rows of the file round"
 """What to do where the last row was recorded first."""
 
@@ -81,8 +85,12 @@ def lacking(
     constants: Mapping[str, float],
     tables: Sequence[Table],
     told: AbstractSet[ColumnMeaning] = frozenset(),
+    ways: Sequence[str] = (),
 ) -> list[str]:
-    """Say what has to be given first; nothing of the quantities whose lack has been `told` already."""
+    """Say what has to be given first; nothing of the quantities whose lack has been `told` already.
+
+    `ways` say how a position or a force follows from what else there is.
+    """
     faults = [
         fault
         for item in assignments
@@ -93,14 +101,15 @@ def lacking(
     if ColumnMeaning.TIME not in present and any(
         sampling_step_s(table, constants) is None for table in tables
     ):
-        unused = {item.column for item in assignments if item.meaning is ColumnMeaning.IGNORED}
+        left = (ColumnMeaning.IGNORED, ColumnMeaning.COVARIATE)
+        unused = {item.column for item in assignments if item.meaning in left and item.unit is None}
         named = {item.column for item in assignments if _is_called_time(item)}
         faults.append(f"no column of time was found{_no_time(tables, named, unused)}")
     if not {ColumnMeaning.POSITION, ColumnMeaning.FORCE} & present:
         names = ", ".join(repr(item.column) for item in assignments)
         faults.append(
             f"neither position nor force was found among {names}; name them with --column position=NAME and "
-            f"--column force=NAME{_or_encoding(tables)}"
+            f"--column force=NAME{_or_encoding(tables)}{''.join(f'; {way}' for way in ways)}"
         )
     return faults
 
@@ -123,14 +132,17 @@ def _written_unit(item: Assignment, tables: Sequence[Table]) -> str:
 
 
 def rotates(item: Assignment, assignments: Sequence[Assignment]) -> bool:
-    """Whether a channel is of what turns: by the units of all of them, else by how any is called."""
-    if item.meaning not in CHANNELS:
+    """Whether what moves turns: by the units of channels, mass and speed, else by how any is called."""
+    if item.meaning not in OF_MOTION:
         return False
     channels = [one for one in assignments if one.meaning in CHANNELS]
+    channels += [one for one in assignments if one.meaning in OF_MOTION and one.meaning not in CHANNELS]
     for one in channels:
         dimensions = VOCABULARY[one.meaning].dimensions
         if one.unit is not None and one.unit.dimension in dimensions:
             return one.unit.dimension is not dimensions[0]
+    if any(one.unit is not None and one.unit.dimension is Dimension.ANGULAR_VELOCITY for one in assignments):
+        return True
     return any(name_score(one.column, one.meaning)[1] in ROTATION_WORDS for one in channels)
 
 
@@ -145,7 +157,8 @@ def _of_column(item: Assignment, written: str, *, turns: bool) -> list[str]:
             f"column {item.column!r} ({item.meaning}) is in {item.unit.symbol}; "
             f"{_way_to_unit(item, item.meaning, item.unit)}"
         )
-    if item.confidence < SURE and item.meaning in (ColumnMeaning.TIME, *CHANNELS):
+    by_sign_alone = item.unit is None and item.confidence >= SYMBOL_MATCH  # its unit will make it sure
+    if item.confidence < SURE and not by_sign_alone and item.meaning in (ColumnMeaning.TIME, *CHANNELS):
         faults.append(
             f"column {item.column!r} may be the {item.meaning} ({item.why}); confirm it with --column "
             f"'{item.meaning}={item.column}', or name the right one"
@@ -155,7 +168,10 @@ def _of_column(item: Assignment, written: str, *, turns: bool) -> list[str]:
 
 def no_unit(item: Assignment, written: str, *, turns: bool) -> str:
     """Say that a column has no unit, or has `written` one that is not known, and which it may be."""
-    unit = VOCABULARY[item.meaning].dimensions[1 if turns else 0].value
+    dimension = VOCABULARY[item.meaning].dimensions[1 if turns else 0]
+    if item.meaning is ColumnMeaning.POSITION and rate_name(item.column) == "speed":  # to be summed up
+        dimension = SPEED_OF[dimension]
+    unit = dimension.value
     lack = f"is in {written!r}, no unit that is known" if written else "has no unit"
     return (
         f"column {item.column!r} ({item.meaning}) {lack}; say --unit '{item.column}={unit}', or which it is"
@@ -224,7 +240,7 @@ def _no_time(tables: Sequence[Table], named: AbstractSet[str], unused: AbstractS
                 return _no_ascent(column, way)
     for table in tables:
         for column in table.columns:
-            if column.name not in unused or column.text is not None or not ascends(column.values):
+            if column.name not in unused or column.text is not None or not is_clock(column.values):
                 continue
             step = float(np.median(np.diff(column.values)))
             if step != round(step) or step > 1.0:
@@ -263,6 +279,14 @@ def changes_within(values: Samples) -> bool:
     """Whether a column changes as what is measured does; what is set for a shot stays for all of it."""
     steps = np.diff(values[np.isfinite(values)])
     return bool(len(steps)) and float(np.mean(steps != 0.0)) > MEASURED_CHANGES
+
+
+def is_clock(values: Samples) -> bool:
+    """Whether a column goes forward in all of its steps, most of them alike, as times of samples do."""
+    steps = np.diff(values)
+    middle = float(np.median(steps)) if steps.size else 0.0
+    alike = np.abs(steps - middle) < 0.5 * middle
+    return bool((steps > 0.0).all() and alike.any() and np.mean(alike) > ASCENDING_SHARE)
 
 
 def counts_rows(values: Samples) -> bool:

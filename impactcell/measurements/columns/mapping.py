@@ -7,11 +7,19 @@ from dataclasses import dataclass, replace
 
 from impactcell.measurements.columns.assignment import (
     SURE,
+    UNSURE,
     Assignment,
     ascends,
     changes_within,
     counts_rows,
     lacking,
+)
+from impactcell.measurements.columns.beside_others import (
+    GIVEN,
+    leave_out_measured_speed,
+    leave_out_of_picture,
+    prefer_position,
+    rate_of_position,
 )
 from impactcell.measurements.columns.column_units import (
     contrary_units,
@@ -21,6 +29,8 @@ from impactcell.measurements.columns.column_units import (
     without_unit,
 )
 from impactcell.measurements.columns.given_values import Given, check_given, unused_gains, without_use
+from impactcell.measurements.columns.joints import OF_JOINT, Joints, joints_of
+from impactcell.measurements.columns.motion_signals import ways_from_signals
 from impactcell.measurements.columns.recognition import (
     CHANNELS,
     SPEED_OF,
@@ -35,8 +45,6 @@ from impactcell.measurements.columns.text_channels import text_channels
 from impactcell.measurements.notation.units import Dimension, MeasuredUnit
 from impactcell.measurements.table import MeasuredColumn, Table
 
-GIVEN = 1.0
-"""Confidence of what was given."""
 PRIORITY = (
     ColumnMeaning.TIME, ColumnMeaning.FORCE, ColumnMeaning.ACTUATOR, ColumnMeaning.POSITION,
     ColumnMeaning.SHOT, ColumnMeaning.VELOCITY, ColumnMeaning.MASS, ColumnMeaning.DIRECTION,
@@ -97,9 +105,11 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
             columns.setdefault(column.name, column)
     check_given(columns, given)
     beside = _beside(tables)
+    joints = joints_of([name for name, column in columns.items() if column.text is None], given.columns)
     candidates = [
         candidate
         for column in columns.values()
+        if not joints.why_out(column.name)
         for candidate in _candidates(column, given, list(columns.values()), beside[column.name])
     ]
     candidates.sort(key=lambda item: (-item.confidence, PRIORITY.index(item.meaning)))
@@ -113,45 +123,33 @@ def guess(tables: Sequence[Table], given: Given | None = None) -> Mapping:
         if taken is not None and taken.confidence < GIVEN and abs(taken.confidence - item.confidence) < 0.05:
             unsure = replace(
                 taken,
-                confidence=min(taken.confidence, 0.4),
+                confidence=min(taken.confidence, UNSURE),
                 why=f"{taken.why}; {item.column!r} could be it too",
             )
             quantities[item.meaning] = chosen[taken.column] = unsure
         if taken is None and item.column not in chosen:
             chosen[item.column] = quantities[item.meaning] = item
-    _prefer_position(chosen, quantities, candidates)
+    prefer_position(chosen, quantities, candidates)
+    leave_out_of_picture(chosen, quantities)
+    leave_out_measured_speed(chosen, quantities, tables)
     shot = quantities.get(ColumnMeaning.SHOT)
     if shot is not None and shot.confidence < GIVEN and _counts_samples(shot.column, tables, quantities):
         del chosen[shot.column]
-    speed = SPEED_OF.get(_dimension_of(quantities.get(ColumnMeaning.POSITION)))
     assignments = tuple(
-        chosen.get(name) or _further(column, given, speed) for name, column in columns.items()
+        chosen.get(name) or _further(column, given, quantities, joints) for name, column in columns.items()
     )
     texts = text_channels(assignments, tables)
     faults = [fault for _, fault in texts.values()]
-    faults += lacking(assignments, given.constants, tables, {meaning for meaning, _ in texts.values()})
+    told = {meaning for meaning, _ in texts.values()}
+    if of_joints := joints.fault():
+        faults.append(of_joints)
+        told |= set(OF_JOINT)
+    faults += lacking(assignments, given.constants, tables, told, ways_from_signals(assignments, OF_JOINT))
     faults += [*without_use(assignments, given, tables), *unused_gains(assignments, given, columns)]
     faults += without_unit(tables, assignments, given.units, given.gains)
     faults += covariates_without_unit(tables, assignments, given.units)
     faults += contrary_units(tables, given.units)
     return Mapping(assignments, given, tuple(faults))
-
-
-def _prefer_position(
-    chosen: dict[str, Assignment],
-    quantities: dict[ColumnMeaning, Assignment],
-    candidates: Sequence[Assignment],
-) -> None:
-    """Take what may be actuator or position, as of an axis, for the position where no other column is."""
-    actuator = quantities.get(ColumnMeaning.ACTUATOR)
-    if actuator is None or actuator.confidence == GIVEN or ColumnMeaning.POSITION in quantities:
-        return
-    for item in candidates:
-        if item.meaning is ColumnMeaning.POSITION and item.column == actuator.column:
-            if item.confidence >= actuator.confidence:
-                del quantities[ColumnMeaning.ACTUATOR]
-                chosen[item.column] = quantities[ColumnMeaning.POSITION] = item
-            return
 
 
 def _counts_samples(
@@ -240,18 +238,31 @@ def _dimension_of(item: Assignment | None) -> Dimension:
     return Dimension.NONE if item is None or item.unit is None else item.unit.dimension
 
 
-def _further(column: MeasuredColumn, given: Given, speed: Dimension | None) -> Assignment:
+def _further(
+    column: MeasuredColumn,
+    given: Given,
+    quantities: AbstractMapping[ColumnMeaning, Assignment],
+    joints: Joints,
+) -> Assignment:
     """Take a column that is none of the quantities for a covariate: it may still explain friction.
 
-    The mean of a `speed` that changes within a shot says nothing that the position does not.
+    The mean of a speed that changes within a shot says nothing that the position does not.
     """
     unit = unit_of(column, given.units)
     if column.name in given.others:
         return Assignment(column.name, given.others[column.name], unit, GIVEN, "given")
+    if why := joints.why_out(column.name):
+        return Assignment(column.name, ColumnMeaning.IGNORED, unit, SURE, why)
     if column.text is None and len(column.values) > 2 and counts_rows(column.values):
         is_count = float(column.values[1] - column.values[0]).is_integer()
         why = "counts the rows" if is_count else "goes by equal steps, as a time does"
         return Assignment(column.name, ColumnMeaning.IGNORED, unit, UNIT_MATCH + SURE, why)
-    if unit is not None and unit.dimension is speed and changes_within(column.values):
-        return Assignment(column.name, ColumnMeaning.IGNORED, unit, SURE, "a speed, as the position has it")
+    dimension = None if unit is None else unit.dimension
+    rate = rate_of_position(column, dimension, quantities)
+    speed = SPEED_OF.get(_dimension_of(quantities.get(ColumnMeaning.POSITION)))
+    if unit is not None and dimension is speed and changes_within(column.values):
+        rate = rate or "speed"
+    if rate:
+        why = f"{'an' if rate == 'acceleration' else 'a'} {rate}, as the position has it"
+        return Assignment(column.name, ColumnMeaning.IGNORED, unit, SURE, why)
     return Assignment(column.name, ColumnMeaning.COVARIATE, unit, SURE, "none of the known quantities")

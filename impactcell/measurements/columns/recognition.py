@@ -57,7 +57,7 @@ VOCABULARY = {
     ),
     ColumnMeaning.FORCE: Words(
         "force kraft contact_force kontaktkraft load_cell kraftsensor kraftaufnehmer dms torque moment "
-        "drehmoment drive_force antriebskraft loadcell",
+        "drehmoment drive_force antriebskraft loadcell effort trq",
         "f fx fz f1 m tau",
         (Dimension.FORCE, Dimension.TORQUE),
     ),
@@ -65,7 +65,7 @@ VOCABULARY = {
         "position weg pos displacement lage verschiebung auslenkung part_position teil bauteil werkstueck "
         "part "
         "slider travel encoder angle winkel laser wegsensor distance displ",
-        "x s q theta phi x1",
+        "x s q theta phi alpha x1 qm",
         (Dimension.LENGTH, Dimension.ANGLE),
     ),
     ColumnMeaning.ACTUATOR: Words(
@@ -81,7 +81,7 @@ VOCABULARY = {
         (Dimension.NONE,),
     ),
     ColumnMeaning.VELOCITY: Words(
-        "velocity geschwindigkeit vorschub speed velo feed commanded_velocity tempo feedrate",
+        "velocity geschwindigkeit vorschub speed velo vel feed commanded_velocity tempo feedrate",
         "v",
         (Dimension.VELOCITY, Dimension.ANGULAR_VELOCITY),
     ),
@@ -99,7 +99,7 @@ VOCABULARY = {
 SPEED_OF = {Dimension.LENGTH: Dimension.VELOCITY, Dimension.ANGLE: Dimension.ANGULAR_VELOCITY}
 """What a position changes by in time; a column of it that is given as the position is summed up."""
 ROTATION_WORDS = frozenset(
-    ("torque", "moment", "drehmoment", "tau", "angle", "winkel", "encoder", "theta", "phi")
+    ("torque", "moment", "drehmoment", "tau", "trq", "angle", "winkel", "encoder", "theta", "phi", "alpha")
 )
 """Of these the words that are met of a rotation."""
 
@@ -120,9 +120,31 @@ COMMAND_WORDS = frozenset(
         "flag",
         "command",
         "raw",
+        "des",
+        "desired",
+        "cmd",
+        "ref",
+        "reference",
+        "con",
+        "fric",
     )
 )
 """Words of a name that say that it was not measured."""
+MEASURED_WORDS = frozenset((
+    "meas", "measured", "act", "actual", "ist", "m", "mes", "msr", "joint", "j", "motor", "link",
+))  # fmt: skip
+"""Words beside a sign of a formula that leave it what it is, as in `q_meas`, `tau_m` or `joint_1_q`."""
+SPEED_NAMES = frozenset((
+    "omega", "w", "rpm", "drehzahl", "winkelgeschwindigkeit", "dq", "qd", "qdot", "dtheta", "thetad",
+    "thetadot", "dphi", "phidot", "dalpha", "alphadot", "xdot", "ydot", "vx", "vy", "vz", "dot",
+))  # fmt: skip
+"""Words and signs of a speed beside those of the velocity of a shot."""
+ACCELERATION_NAMES = frozenset((
+    "ddq", "qdd", "qddot", "ddtheta", "thetaddot", "ddphi", "ddalpha", "xddot", "ddot",
+))  # fmt: skip
+"""Signs of an acceleration."""
+JOINT_SIGNS = frozenset(("q", "theta", "phi", "alpha", "tau"))
+"""Signs that are numbered by joints, as in `q7` or `theta2`."""
 RATE_WORDS = "sample_rate sampling_rate rate_hz abtastrate samplerate fs sampling_frequency abtastfrequenz"
 """Names under which a file says how often it was sampled."""
 STEP_WORDS = (
@@ -149,6 +171,8 @@ def normalised(name: str) -> str:
         ("θ", "theta"),
         ("φ", "phi"),
         ("τ", "tau"),
+        ("α", "alpha"),
+        ("ω", "omega"),
     ):
         text = text.replace(sign, plain)
     return re.sub(r"[^a-z0-9]+", "_", text).strip("_")
@@ -175,12 +199,14 @@ def name_score(name: str, meaning: ColumnMeaning) -> tuple[float, str]:
         return WORD_MATCH, text
     if text in symbols:
         return SYMBOL_MATCH, text
-    if COMMAND_WORDS & set(text.split("_")) and meaning not in (
+    if COMMAND_WORDS & set(_tokens(text)) and meaning not in (
         ColumnMeaning.VELOCITY,
         ColumnMeaning.DIRECTION,
     ):
         return 0.0, ""
-    tokens = [re.sub(r"\d+$", "", token) for token in text.split("_")]
+    if _sign(text) in symbols:
+        return SYMBOL_MATCH, _sign(text)
+    tokens = _tokens(text)
     for word in known:
         parts = word.split("_")
         if all(part in tokens for part in parts):
@@ -190,3 +216,33 @@ def name_score(name: str, meaning: ColumnMeaning) -> tuple[float, str]:
         if len(word) >= 4 and any(word in token for token in tokens):
             return TOKEN_MATCH - 0.1, word
     return 0.0, ""
+
+
+def rate_name(name: str) -> str:
+    """Say whether a column is called as a speed or as an acceleration of a position; empty where as neither.
+
+    Examples
+    --------
+    >>> rate_name("dq7"), rate_name("theta_ddot"), rate_name("Kraft")
+    ('speed', 'acceleration', '')
+    """
+    text = normalised(AGAIN.sub("", name))
+    words = {token for token in _tokens(text) if token}
+    if words & COMMAND_WORDS:
+        return ""
+    if words & ACCELERATION_NAMES:
+        return "acceleration"
+    is_speed = words & SPEED_NAMES or name_score(name, ColumnMeaning.VELOCITY)[0] > 0.0
+    return "speed" if is_speed else ""
+
+
+def _tokens(text: str) -> list[str]:
+    """Give the words of a normalised name without the numbers behind them."""
+    return [re.sub(r"\d+$", "", token) for token in text.split("_")]
+
+
+def _sign(text: str) -> str:
+    """Give the sign of a formula that a normalised name is but for a joint's number and words; else empty."""
+    signs = [token for token in _tokens(text) if token and token not in MEASURED_WORDS]
+    is_numbered = any(sign.isdigit() for sign in text)
+    return signs[0] if len(signs) == 1 and (not is_numbered or signs[0] in JOINT_SIGNS) else ""

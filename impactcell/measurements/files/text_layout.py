@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from impactcell.errors import MeasurementError
 from impactcell.measurements.files.dialect import SAMPLED_LINES, later_lines, split_cells
 from impactcell.measurements.notation.numbers import is_missing, parse_number
-from impactcell.measurements.notation.units import parse_unit, split_unit
+from impactcell.measurements.notation.units import parse_unit, split_units
 
 HEAD_LINES = 2000
 """Lines among which the first row of numbers is looked for; no preamble that we met has more than some
@@ -149,8 +149,8 @@ def _named(
         if unit_row is not None:
             units = [cell.strip("[]() ") if parse_unit(cell) else "" for cell in unit_row[1]]
         return names, units
-    for place, cell in enumerate(header[1]):
-        names[place], unit = split_unit(cell)
+    for place, (name, unit) in enumerate(split_units(header[1])):
+        names[place] = name
         units[place] = unit or ""
     if unit_row is not None:
         for place, cell in enumerate(unit_row[1]):

@@ -3,6 +3,7 @@
 import enum
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -128,6 +129,13 @@ _SUFFIX_WORDS = {"n": "N", "nm": "nm", "v": "V", "a": "A", "k": "K", "hz": "Hz",
 _SPEED_SUFFIXES = (("m", "s"), ("mm", "s"), ("m", "min"), ("mm", "min"), ("rad", "s"))
 """Ends of a name that are a speed and no time, as in velocity_mm_min."""
 
+_TORQUES = ("torque", "moment", "tau", "trq")
+"""Names of what is in N m where `nm` stands behind them, for no torque is in nanometres."""
+_NO_LENGTHS = frozenset((
+    "tau", "torque", "trq", "force", "effort", "dq", "qd", "ddq", "qdd", "omega", "vel", "velocity",
+    "speed", "dtheta", "u", "i", "current", "voltage",
+))  # fmt: skip
+"""Names of what is in no metres: there `_m` says that it was measured, or of the motor."""
 _SEPARATORS = (" ?/ ?", " in ", ", ", " ", "_")
 """What stands between a name and its unit, in the order in which they are believed."""
 _ONE_WORD = re.compile("(?!1 ?/ ?s|1 / )[^ /]+(?: ?/ ?[^ /]+)?")
@@ -208,8 +216,38 @@ def split_unit(header: str) -> tuple[str, str | None]:
 
     >>> split_unit("v / mm/min"), split_unit("dx/dt / mm/s")
     (('v', 'mm/min'), ('dx/dt', 'mm/s'))
+
+    What the name says counts: no torque is in nanometres, and none in metres.
+
+    >>> split_unit("torque_nm"), split_unit("tau_m")
+    (('torque', 'Nm'), ('tau_m', None))
     """
-    text = " ".join(header.split())
+    name, unit = _split(" ".join(header.split()))
+    if unit == "nm" and any(word in name.lower() for word in _TORQUES):
+        return name, "Nm"
+    if unit == "m" and header.strip().endswith("_m") and name.lower() in _NO_LENGTHS:
+        return header.strip(), None
+    return name, unit
+
+
+def split_units(headers: Sequence[str]) -> list[tuple[str, str | None]]:
+    """Take the units off the names of a table: where `_m` is none behind one name, it is none behind others.
+
+    Examples
+    --------
+    >>> split_units(["q_m", "tau_m"]), split_units(["x_m", "F_N"])
+    ([('q_m', None), ('tau_m', None)], [('x', 'm'), ('F', 'N')])
+    """
+    found = [split_unit(header) for header in headers]
+    if any(unit is None and name.endswith("_m") for name, unit in found):
+        return [
+            (header.strip(), None) if unit == "m" and header.strip().endswith("_m") else (name, unit)
+            for header, (name, unit) in zip(headers, found, strict=True)
+        ]
+    return found
+
+
+def _split(text: str) -> tuple[str, str | None]:
     bracket = re.fullmatch(r"(.*\S)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\})", text)
     if bracket:
         name, *units = bracket.groups()

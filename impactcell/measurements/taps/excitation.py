@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from impactcell.campaign import Excitation
+from impactcell.campaign import Coordinate, Excitation
 from impactcell.measurements.columns.recognition import ColumnMeaning
 from impactcell.measurements.records.measured_records import Record
 from impactcell.records import Samples
@@ -17,6 +17,10 @@ DRIVE_REVERSAL = 0.25
 pushes."""
 END_SHARE = 0.05
 """Share of a record at its begin and end by which is told whether a channel came back."""
+SIDE_SHARE = 0.1
+"""How far from its mean something is on one side of it, as a share of its range [1]."""
+FEWEST_CHANGES = 4
+"""Changes of side from which on something swings: what slides and springs back makes one or two."""
 SWAPPED = (
     "the position is a short push, as the force of a tap is, and the force stays where it went, as a part "
     "does: they look swapped (--column force=NAME --column position=NAME, and --unit of both, say which is "
@@ -52,6 +56,24 @@ def looks_swapped(records: Sequence[Record]) -> bool:
         if {ColumnMeaning.POSITION, ColumnMeaning.FORCE} <= set(record.values)
     ]
     return 2 * sum(swapped) > len(records)
+
+
+def notes_of_swings(records: Sequence[Record], excitation: Excitation, coordinate: Coordinate) -> list[str]:
+    """Tell what swings and was taken for a slide along a line: a pendulum of which x was filmed, say."""
+    if excitation is not Excitation.FREE_SLIDE or coordinate is Coordinate.ROTATION:
+        return []
+    swinging = [record.place for record in records if _changes_side(record.values[ColumnMeaning.POSITION])]
+    if not swinging:
+        return []
+    of = "it swings to and fro" if len(records) == 1 else f"{len(swinging)} of {len(records)} records swing"
+    return [f"{of}; of a pendulum give the angle (--column position=NAME --unit NAME=rad)"]
+
+
+def _changes_side(values: Samples) -> bool:
+    """Say whether a channel goes from one side of its mean to the other again and again."""
+    centred = values - np.mean(values)
+    sides = np.sign(centred[np.abs(centred) > SIDE_SHARE * np.ptp(values)])
+    return int(np.count_nonzero(np.diff(sides))) >= FEWEST_CHANGES
 
 
 def _is_push(values: Samples) -> bool:

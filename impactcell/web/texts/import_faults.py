@@ -8,6 +8,7 @@ from impactcell.german.findings import GERMAN_PHASES, GERMAN_QUANTITIES, with_de
 from impactcell.web.texts.fault_pattern import COLUMN, PLACE, FaultPattern
 from impactcell.web.texts.faults_between_files import FAULTS_BETWEEN_FILES
 from impactcell.web.texts.faults_of_cells import FAULTS_OF_CELLS
+from impactcell.web.texts.faults_of_machines import FAULTS_OF_MACHINES
 from impactcell.web.texts.faults_of_taps import FAULTS_OF_TAPS
 from impactcell.web.texts.faults_of_times import FAULTS_OF_TIMES
 from impactcell.web.texts.import_notes import page_note
@@ -19,6 +20,7 @@ FAULTS: Final = (
     *FAULTS_OF_CELLS,
     *FAULTS_OF_TIMES,
     *FAULTS_OF_TAPS,
+    *FAULTS_OF_MACHINES,
     FaultPattern(
         r"(?P<cells>\d+) cells where the header has (?P<names>\d+)",
         "{cells} cells where the header has {names}",

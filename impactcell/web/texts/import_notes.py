@@ -136,6 +136,17 @@ GERMAN: Final = {
     r"the only column in (\S+)": r"einzige Spalte in \1",
     r"none of the known quantities": "keine der bekannten Größen",
     r"a speed, as the position has it": "eine Geschwindigkeit, wie sie aus der Lage folgt",
+    r"an acceleration, as the position has it": "eine Beschleunigung, wie sie aus der Lage folgt",
+    r"a coordinate beside '(.+)', as of a film; of what swings export the angle":
+        r"eine Koordinate neben „\1“ wie aus einem Film; von dem, was pendelt, den Winkel ausgeben",
+    r"it swings to and fro; of a pendulum give the angle": "es pendelt: von einem Pendel den Winkel angeben",
+    r"(\d+) of (\d+) records swing; of a pendulum give the angle":
+        r"\1 von \2 Aufzeichnungen pendeln: von einem Pendel den Winkel angeben",
+    r"of joint (\d+), one of (\d+)": r"von Gelenk \1, einem von \2",
+    r"of joint (\d+), not of joint (\d+)": r"von Gelenk \1, nicht von Gelenk \2",
+    r"'(.+)' may have driven what is taken to move freely: .*":
+        r"„\1“ könnte angetrieben haben, was hier als frei bewegt gilt: dann als Kraft angeben, mit dem, "
+        "wofür es steht",
     r"counts the rows": "zählt die Zeilen",
     r"goes by equal steps, as a time does": "wächst um gleiche Schritte wie eine Zeit",
     r"given": "angegeben",

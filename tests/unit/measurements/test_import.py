@@ -386,8 +386,12 @@ def test_columns_are_left_out_or_kept_as_covariates(tmp_path: Path) -> None:
             p=("bar", WAVE),
         )
     ]
+    speed = next(item for item in guess(tables).assignments if item.column == "Speed")
+    # measured beside the position, so that nobody needs its unit
+    assert (speed.meaning, speed.why) == (ColumnMeaning.IGNORED, "a speed, as the position has it")
+    given = read_given({"columns": ["velocity=Speed"]})
     with pytest.raises(MeasurementError, match="column 'Speed' \\(velocity\\) has no unit"):
-        make_campaign(tables, guess(tables))
+        make_campaign(tables, guess(tables, given))
     given = read_given({"columns": ["ignored=Speed", "ignored=torque_enable"]})
     imported = make_campaign(tables, guess(tables, given))
     assert set(imported.campaign.shots[0].covariates) == {"p_pa"}
