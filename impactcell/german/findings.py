@@ -187,6 +187,9 @@ def german_headline(result: Mapping[str, Any]) -> str:
             if result.get("unconfirmed"):
                 names = enumerated_names([*map(german_effect, result["unconfirmed"])], "und")
                 why = "zurückgehaltene bestätigen es nicht"
+                since = result.get("unconfirmed_since") or {}
+                if any(" want it" in lacks for lacks in since.values()):
+                    why = "zurückgehaltene wollen es, doch reicht das nicht (warum, steht im Bericht)"
                 if "without repeated settings held-out shots" in result.get("headline", ""):
                     why = "ohne Wiederholungen können zurückgehaltene es nicht bestätigen"
                 said = f"{names} würde angepasste Messungen erklären, {why}."

@@ -200,6 +200,10 @@ def test_what_the_simulation_contradicts_is_not_named(monkeypatch: pytest.Monkey
     assert finding.verdict == "unknown"
     assert finding.established == ()
     assert finding.unconfirmed == (name,)
+    assert finding.unconfirmed_since == {
+        name: "held-out blocks want it, but the simulation of held-out records contradicts it"
+    }
+    assert german_sentences.reason(finding.unconfirmed_since[name])[0] == "de"
     assert finding.fall.after == finding.fall.before
     note = next(note for note in finding.notes if "simulated open loop" in note)
     assert note.endswith("records are 1.2 N off with it, 1 without; it is not named.")

@@ -119,7 +119,7 @@ def test_notes_on_a_machine_are_said_in_german() -> None:
     texts += sentences_of(record_notes.notes_of_records, 6)
     notes = [text for text in texts if text[0].isupper() or text[0].isdigit()]
     notes = [note for note in notes if not note.startswith("Hold numbers")]
-    assert len(notes) == 6
+    assert len(notes) == 7
     alike = "periodic force, covariate friction(oil): on these records like inertia, gravity or drive, and so"
     beside = "covariate_friction(oil) shows only beside quadratic_drag, which hides it on these records;"
     off = "Simulated open loop, held-out records are 0.2 N m off with it, 0.1 without."

@@ -11,6 +11,7 @@ from impactcell.discrepancy.machine.better_simulated import errors_with_terms
 from impactcell.discrepancy.machine.establishing import establish
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
+from impactcell.discrepancy.machine.records.travel import ABOUT_A_TURN, TURN_IN_DEGREES
 from impactcell.discrepancy.machine.records.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.regression.block_plan import BlockPlan
 from impactcell.discrepancy.machine.regression.block_sums import blocks_of, fit_blocks
@@ -28,8 +29,6 @@ FOLLOWED_PERCENT = 90.0
 """Fit of a simulation from which on no column is turned or a thousand times too large. Our choice."""
 DEGREE = math.pi / 180.0
 """[rad]."""
-ABOUT_A_TURN = 0.02
-"""Share by which a period may differ from 360 for its angle to look like degrees. Our choice."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +146,7 @@ def with_degrees_asked_for(finding: MachineFinding) -> MachineFinding:
     """Ask whether angles are in degrees where a wave of them repeats after about 360."""
     if finding.base.coordinate is not Coordinate.ROTATION:
         return finding
-    turns = [period for period in _periods(finding) if abs(period / 360.0 - 1.0) <= ABOUT_A_TURN]
+    turns = [period for period in _periods(finding) if abs(period / TURN_IN_DEGREES - 1.0) <= ABOUT_A_TURN]
     if not turns:
         return finding
     asked = f"A period of {turns[0]:.0f} rad is a turn in degrees: see whether angle_rad is in degrees."

@@ -44,6 +44,8 @@ WEIGHINGS = 2
 """Rounds of weights by what a model leaves, and of a model by these weights, at least [1]."""
 MOST_WEIGHINGS = 12
 """And at most, as long as shapes move: the farther off, the less weigh the rows that tell them [1]."""
+BEFORE_IT = "it was found beside a term that is not confirmed"
+"""What a term lacks that was not tried on held-out records."""
 SETTLED = 1e-3
 """Relative move of a shape from one round to the next up to which it has settled [1]."""
 
@@ -51,7 +53,8 @@ SETTLED = 1e-3
 class _Proof(NamedTuple):
     """Blocks by some weights, models with no, one and two terms, and how the held-out gap falls with each.
 
-    `is_hidden`: a term's own friction hides by these weights that the gap is open without it.
+    `is_hidden`: a term's own friction hides by these weights that the gap is open without it; `lacks`: what
+    the first term that was not confirmed lacks.
     """
 
     training: Blocks
@@ -59,6 +62,7 @@ class _Proof(NamedTuple):
     models: list[FittedModel]
     falls: dict[str, FallOfGap]
     is_hidden: bool
+    lacks: str = ""
 
 
 def establish(
@@ -147,12 +151,13 @@ def establish(
         notes = [*notes, *held_number_notes(explained)]
         steps = blamed_on_number(steps, explained)
     most = explains_most(explained)
+    unconfirmed = tuple(term.choice.name for term in proposed if term.choice.name not in falls)
     finding = MachineFinding(
         base=fits.base,
         records=fits.records,
         steps=tuple(steps),
         established=tuple(falls),
-        unconfirmed=tuple(term.choice.name for term in proposed if term.choice.name not in falls),
+        unconfirmed=unconfirmed,
         falls=falls,
         nominal=nominal,
         final=with_shape_intervals(fits, final),
@@ -169,6 +174,7 @@ def establish(
         seed=seed,
         is_told_of=bool(explained),
         number_off="" if most is None else most.number.name,
+        unconfirmed_since=_lacking(unconfirmed, proof.lacks, contradicted),
     )
     if finding.is_at_floor or fits.base.force_offset_by_record:
         return finding
@@ -195,7 +201,7 @@ def _prove(
     terms = fits.with_best_shapes((*base_terms, *proposed), len(base_terms))
     training, held_out = fits.blocks()
     models, falls = [fits.fit(base_terms, settle=False)], dict[str, FallOfGap]()
-    is_hidden = False
+    is_hidden, lacks = False, ""
     for count in range(len(base_terms) + 1, len(terms) + 1):
         after = fits.fit(terms[:count], settle=False)
         fall = fall_of_gap(held_out, models[-1], after, seed)
@@ -203,10 +209,19 @@ def _prove(
             is_hidden = True
             fall = fall_of_gap(by_base.held_out, by_base.models[len(falls)], after, seed, held_out)
         if not fall.is_real:
+            lacks = fall.lacks
             break
         models.append(after)
         falls[terms[count - 1].choice.name] = fall
-    return _Proof(training, held_out, models, falls, is_hidden)
+    return _Proof(training, held_out, models, falls, is_hidden, lacks)
+
+
+def _lacking(names: Sequence[str], lacks: str, contradicted: frozenset[str]) -> dict[str, str]:
+    """Say what each of these names lacks: the first what its proof said, others the one before them."""
+    by_simulation = "held-out blocks want it, but the simulation of held-out records contradicts it"
+    told = [by_simulation if name in contradicted else lacks for name in names[:1]]
+    told = [one or BEFORE_IT for one in told] + [BEFORE_IT] * (len(names) - 1)
+    return dict(zip(names, told, strict=True))
 
 
 def _is_settled(before: Sequence[ChosenTerm], now: Sequence[ChosenTerm]) -> bool:

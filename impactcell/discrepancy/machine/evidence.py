@@ -35,6 +35,23 @@ class FallOfGap:
         """Whether no gap is open without the term, and held-out blocks want it all the same."""
         return math.isnan(self.closed) and self.p_value <= MAX_P_VALUE
 
+    @property
+    def lacks(self) -> str:
+        """What it lacks to be confirmed, as a clause; empty where it is."""
+        if self.is_real:
+            return ""
+        if self.p_value > MAX_P_VALUE:
+            return f"held-out records do not confirm it (p = {self.p_value:.2g})"
+        wanted = f"held-out records want it (p = {self.p_value:.2g})"
+        if math.isnan(self.closed):
+            return f"{wanted}, but without it they leave no gap that it could close"
+        if self.closed < MIN_CLOSED_SHARE:
+            return f"{wanted}, but it closes {100.0 * self.closed:.2g} % of their gap, less than counts"
+        return (
+            f"{wanted}, but not alike: of their gap it closes {100.0 * self.low:.0f} to "
+            f"{100.0 * self.high:.0f} % (95 %), which may be nothing"
+        )
+
     def is_real_among(self, tests: int) -> bool:
         """Whether held-out blocks confirm it where so many tests share the error of one (Bonferroni)."""
         return self.low > 0.0 and self.closed >= MIN_CLOSED_SHARE and self.p_value <= MAX_P_VALUE / tests

@@ -125,6 +125,8 @@ class MachineFinding:
         Whether what remains is told to be a number of the base model, or a constant of each record.
     number_off : str
         Number that the base model holds and that would explain most of what remains; empty where none does.
+    unconfirmed_since : mapping
+        What each unconfirmed term lacks, as a clause.
     """
 
     base: BaseModel
@@ -155,6 +157,7 @@ class MachineFinding:
     tied_models: Mapping[str, FittedModel] = field(default_factory=dict)
     is_told_of: bool = False
     number_off: str = ""
+    unconfirmed_since: Mapping[str, str] = field(default_factory=dict)
 
     @staticmethod
     def enough(training: Blocks, held_out: Blocks) -> bool:

@@ -10,7 +10,12 @@ from impactcell.discrepancy.report.german_reasons import reason
 from impactcell.discrepancy.report.german_sentences import equation, in_german, label, written
 from impactcell.discrepancy.report.german_words import phrase as channel_name
 from impactcell.discrepancy.report.german_words import term_name as phrase
-from impactcell.discrepancy.report.machine_sentences import law_equation, noise_keys, why_not_named
+from impactcell.discrepancy.report.machine_sentences import (
+    NOT_CONFIRMED,
+    law_equation,
+    noise_keys,
+    why_not_named,
+)
 from impactcell.german.findings import enumerated, enumerated_names
 from impactcell.german.open_loop import german_better_sentence, german_open_loop_sentence
 from impactcell.physics.effect_names import as_title
@@ -80,7 +85,8 @@ def headline(finding: MachineFinding) -> str:
         said = f"Kein bekannter Term erklärt eine Abweichung von {before:.2f} Rauschschwellen"
         if finding.unconfirmed:
             names = enumerated_names([*map(phrase, finding.unconfirmed)], "und")
-            said = f"{names} würde angepasste Messungen erklären, zurückgehaltene bestätigen es nicht"
+            lacks = reason(finding.unconfirmed_since.get(finding.unconfirmed[0], NOT_CONFIRMED))[1]
+            said = f"{names} würde angepasste Messungen erklären, doch: {lacks}"
         why = reason(finding.steps[0].reason)[1] if finding.steps else ""
         said = f"{said}: {why}." if why else f"{said}."
     else:

@@ -222,6 +222,10 @@ NOTES: Final[Patterns] = (
     (r"Where gravity acts, (\w+) is free in the base model; wider angles tell it from (.+)\.",
      lambda m: f"Wo die Schwerkraft wirkt, ist {m[1]} im Grundmodell frei; größere Winkel unterscheiden sie "
      f"von „{_terms(m[2])}“."),
+    (r"Every record turns on one way, through (\S+) turns at most: .*",
+     (r"Jede Messung dreht nur in eine Richtung, durch bis zu \1 Umdrehungen: Was sich über sie ändert, ist "
+      "auch eine Funktion der Zeit; nach einem Gesetz des Ortes wird nicht gesucht, nur nach Wellen, die "
+      "sich mit jeder Umdrehung wiederholen.")),
     (r"Every record goes one way: a function of position is one of the time .*",
      ("Jede Messung geht nur in eine Richtung: Eine Funktion des Ortes ist auch eine der Zeit seit ihrem "
       "Beginn, und diese Messungen unterscheiden sie kaum.")),

@@ -88,6 +88,20 @@ REASONS: Final[Patterns] = (
      "in diesen Messungen sieht es aus wie Trägheit, Schwerkraft oder Antrieb"),
     (r"another one explains more", "ein anderer Term erklärt mehr"),
     (r"held-out records do not confirm it", "zurückgehaltene Messungen bestätigen es nicht"),
+    (r"held-out records do not confirm it \(p = (\S+)\)",
+     r"zurückgehaltene Messungen bestätigen es nicht (p = \1)"),
+    (r"held-out records want it \(p = (\S+)\), but without it they leave no gap that it could close",
+     r"zurückgehaltene Messungen wollen es (p = \1), lassen ohne es aber keine Abweichung, die es schlösse"),
+    (r"held-out records want it \(p = (\S+)\), but it closes (\S+) % of their gap, less than counts",
+     r"zurückgehaltene Messungen wollen es (p = \1), doch schließt es nur \2 % ihrer Abweichung"),
+    ((r"held-out records want it \(p = (\S+)\), but not alike: of their gap it closes (\S+) to (\S+) % "
+      r"\(95 %\), which may be nothing"),
+     (r"zurückgehaltene Messungen wollen es (p = \1), aber nicht alle: Von ihrer Abweichung schließt es \2 "
+      r"bis \3 % (95 %), also vielleicht nichts")),
+    (r"held-out blocks want it, but the simulation of held-out records contradicts it",
+     "zurückgehaltene Blöcke wollen es, doch die Simulation zurückgehaltener Messungen widerspricht"),
+    (r"it was found beside a term that is not confirmed",
+     "es wurde neben einem Term gefunden, der nicht bestätigt ist"),
     (r"beside a remainder one term is named at most",
      "neben einem Rest wird höchstens ein Term genannt"),
 )  # fmt: skip

@@ -43,6 +43,7 @@ def machine_document(finding: MachineFinding) -> dict[str, Any]:
             _effect(finding, term) for term in finding.final.terms if term.choice.name in finding.established
         ],
         "unconfirmed": list(finding.unconfirmed),
+        "unconfirmed_since": dict(finding.unconfirmed_since),
         "remaining": _remaining(finding),
         "unexplained": None,
         "gap": {

@@ -11,6 +11,10 @@ from impactcell.physics.effect_names import as_title, in_words
 __all__ = ["equation", "headline", "label", "note", "phrase", "reason", "reference", "setting", "written"]
 
 
+NOT_CONFIRMED = "held-out records do not confirm it"
+"""What is said of a term of which it is not known what it lacks."""
+
+
 def phrase(name: str) -> str:
     """Name of a term as one would say it."""
     identifier, _, column = name.partition("(")
@@ -61,7 +65,7 @@ def law_equation(finding: MachineFinding, law: MachineLaw) -> str:
 def why_not_named(finding: MachineFinding, name: str) -> str:
     """Say why a term was not named that a law turned out to be."""
     if name in finding.unconfirmed:
-        return "held-out records do not confirm it"
+        return finding.unconfirmed_since.get(name, NOT_CONFIRMED)
     if name in {choice.name for choice in finding.base.terms}:
         return "the base model has it"
     tried = [step for step in finding.steps if name in {trial.term.choice.name for trial in step.trials}]
@@ -109,7 +113,8 @@ def _conclusion(finding: MachineFinding) -> str:
         said = f"No known term explains a held-out gap of {before:.2f} noise floors"
         if finding.unconfirmed:
             names = enumerated([*map(phrase, finding.unconfirmed)], "and")
-            said = f"{as_title(names)} would explain what fitted, but held-out records do not confirm it"
+            lacks = finding.unconfirmed_since.get(finding.unconfirmed[0], NOT_CONFIRMED)
+            said = f"{as_title(names)} would explain what fitted, but {lacks}"
         reason = finding.steps[0].reason if finding.steps else ""
         return f"{said}: {reason}." if reason else f"{said}."
     groups = [

@@ -11,6 +11,7 @@ import numpy as np
 from impactcell.discrepancy.machine.fits.fitted_model import FittedModel
 from impactcell.discrepancy.machine.fits.model_forces import friction_at_rest
 from impactcell.discrepancy.machine.records.motion_scale import motion_scale, widening
+from impactcell.discrepancy.machine.records.travel import goes_through_many_turns
 from impactcell.discrepancy.machine.records.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.regression.block_plan import BlockPlan
 from impactcell.discrepancy.machine.regression.block_sums import (
@@ -35,6 +36,7 @@ from impactcell.discrepancy.machine.regression.weak_form import (
     Rows,
     build_rows,
     finer_grid,
+    is_of_turns,
     residual_of,
     shape_grid,
 )
@@ -79,7 +81,9 @@ class MachineFits:
         self.base = base
         self.candidates = tuple(candidates)
         self.held = held
-        self.scale = motion_scale(records, base.response, base.gravity_torque.value)
+        scale = motion_scale(records, base.response, base.gravity_torque.value)
+        many = goes_through_many_turns(base.coordinate, scale.low, scale.high)
+        self.scale = replace(scale, many_turns=many)
         self.block_s = base.block_s if math.isfinite(base.block_s) else self.scale.period_s
         self.plan = BlockPlan(self.block_s, held, PIECES_PER_BLOCK / widening(records, self.scale))
         self.gravity = base.gravity_torque.value
@@ -257,7 +261,7 @@ class MachineFits:
             if len(grid) == 1:
                 continue
             shape = self._best_shape(terms, place, grid)
-            for _ in range(REFINEMENTS):
+            for _ in range(0 if is_of_turns(term_of(choice), self.scale) else REFINEMENTS):
                 finer = finer_grid(finer, shape)
                 shape = self._best_shape(terms, place, finer)
             self.shapes[choice.name] = tuple(sorted({*grid, shape}))

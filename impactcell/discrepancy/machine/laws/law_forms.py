@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 
+from impactcell.campaign import Coordinate
 from impactcell.discrepancy.laws import RankedForm, Tangent, rank_forms
 from impactcell.discrepancy.machine.fits.fitted_model import FittedModel
 from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
+from impactcell.discrepancy.machine.records.travel import may_repeat
 from impactcell.discrepancy.machine.regression.block_sums import out_of_fold_losses
 from impactcell.discrepancy.machine.regression.trials import ChosenTerm, mean_over_error
 from impactcell.discrepancy.machine.regression.weak_form import Column
@@ -12,7 +14,7 @@ from impactcell.discrepancy.machine.search.selection import MIN_SHARE_OF_FREE
 from impactcell.discrepancy.machine.search.ties import TIE_Z
 from impactcell.discrepancy.machine.terms.base_model import LawForm, TermChoice
 from impactcell.discrepancy.machine.terms.law_terms import LAW_PREFIX, term_of
-from impactcell.discrepancy.machine.terms.rival_forms import SPLINE_PIECES, columns_of_splines
+from impactcell.discrepancy.machine.terms.rival_forms import COVARIATES, SPLINE_PIECES, columns_of_splines
 from impactcell.records import Samples
 
 REFITTED = 20
@@ -21,22 +23,34 @@ PIECES_PER_WAVE = 3.0
 """Pieces of a spline that a wave takes to be seen in it."""
 
 
-def nearest_forms(form: str, tangent: Tangent, tested: tuple[float, float]) -> tuple[TermChoice, ...]:
+def nearest_forms(
+    form: str, tangent: Tangent, tested: tuple[float, float], coordinate: Coordinate
+) -> tuple[TermChoice, ...]:
     """Functional forms in a place that come nearest to its spline, over the range that was gone through."""
-    ranked = [item for item in rank_forms(tangent) if _is_resolved(item, tested)]
+    of_place = COVARIATES[form] == "position"
+    ranked = [
+        item
+        for item in rank_forms(tangent)
+        if _is_resolved(item, tested)
+        and not (of_place and any(not may_repeat(period, coordinate, *tested) for period in _periods(item)))
+    ]
     return _choices(form, ranked[:REFITTED], max(map(abs, tested)))
 
 
 def _is_resolved(form: RankedForm, tested: tuple[float, float]) -> bool:
     """Whether a spline could have shown every wave of a form."""
     shortest = PIECES_PER_WAVE * (tested[1] - tested[0]) / SPLINE_PIECES
-    return all(
-        value >= shortest
+    return all(period >= shortest for period in _periods(form))
+
+
+def _periods(form: RankedForm) -> list[float]:
+    return [
+        value
         for item in form.terms
         for atom, values in zip(item.term, item.shapes, strict=True)
         for shape, value in zip(atom.shapes, values, strict=True)
         if shape.name == "period"
-    )
+    ]
 
 
 def _choices(form: str, ranked: Sequence[RankedForm], reference: float) -> tuple[TermChoice, ...]:

@@ -33,6 +33,7 @@ from impactcell.discrepancy.machine.laws.law_refusal import (
     refusal_of,
 )
 from impactcell.discrepancy.machine.laws.smooth_law import as_law, smooth_law
+from impactcell.discrepancy.machine.records.travel import turns_on
 from impactcell.discrepancy.machine.regression.block_sums import Blocks, fit_blocks, out_of_fold_losses
 from impactcell.discrepancy.machine.regression.held_number import HeldNumber
 from impactcell.discrepancy.machine.regression.trials import mean_over_error
@@ -194,6 +195,8 @@ class _LookedAt:
         Else why there is none: `refused` makes it of what is wrong with that force.
         """
         fits, columns = self.fits, list(self.model.fit.columns)
+        if turns_on(fits.records, fits.base.coordinate):
+            return NOTHING_HELPS
         smooth = smooth_law(fits, self.own, columns, self.before)
         if not _holds(smooth.gains, least):
             return refused(NOT_IN_BLOCKS)
@@ -215,7 +218,7 @@ class _LookedAt:
         tested = finding.scale.ranges[COVARIATES[spline.form]]
         smooth = with_spline(fits, self.training, model, spline)
         tangent, variance = tangent_of(self.training, fits, smooth, spline, tested)
-        choices = nearest_forms(spline.form, tangent, tested)
+        choices = nearest_forms(spline.form, tangent, tested, fits.base.coordinate)
         laws = Forms(fits, (*self.own, *choices), model, choices)
         chosen, equivalents = laws.condensed(spline.gains, self.before)
         if chosen is None:
@@ -241,9 +244,15 @@ class _LookedAt:
 
 
 def _gone_through(fits: MachineFits, finding: MachineFinding) -> list[str]:
-    """Free forms whose covariate has a range; none over a load that looks like the drive itself."""
+    """Free forms whose covariate has a range; none over a load that looks like the drive itself.
+
+    And none over the position of what turns on one way: it would be one of the time.
+    """
     ranges = finding.scale.ranges
     forms = [form for form in FREE_FORMS if ranges[COVARIATES[form]][1] > ranges[COVARIATES[form]][0]]
     looked_at = {trial.term.choice for step in finding.steps for trial in step.trials}
     is_drive = BY_LOAD in fits.candidates and BY_LOAD not in looked_at
-    return [form for form in forms if not (is_drive and COVARIATES[form] == "load")]
+    on = turns_on(fits.records, fits.base.coordinate)
+    unfit = {"load"} if is_drive else set[str]()
+    unfit |= {"position"} if on else set()
+    return [form for form in forms if COVARIATES[form] not in unfit]

@@ -66,6 +66,8 @@ class MotionScale:
         Largest speed and load.
     low, high : float
         Range of positions.
+    many_turns : bool
+        That range is of a rotation through many turns.
     """
 
     period_s: float
@@ -73,6 +75,7 @@ class MotionScale:
     load: float
     low: float
     high: float
+    many_turns: bool = False
 
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:

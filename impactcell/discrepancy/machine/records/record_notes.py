@@ -7,7 +7,9 @@ import numpy as np
 
 from impactcell.campaign import COLUMNS
 from impactcell.discrepancy.machine.records.lost_stretches import MOST_CLIPPED
+from impactcell.discrepancy.machine.records.travel import turns_on
 from impactcell.discrepancy.machine.records.uniform_records import UniformRecord
+from impactcell.discrepancy.machine.records.whole_turns import TURN
 from impactcell.discrepancy.machine.terms.base_model import PRIOR_REACH, BaseModel
 
 INERTIA_SHARE = 0.01
@@ -36,6 +38,13 @@ def notes_of_records(base: BaseModel, records: Sequence[UniformRecord]) -> list[
             "noise adds up: that was read off neighbouring samples of the speed and taken for white. Of a "
             "speed that was filtered, or made from an encoder's counts, it is not: "
             f"state {key} in campaign.yaml, or record the position itself."
+        )
+    if turns_on(records, base.coordinate):
+        turns = max(float(np.ptp(record.position)) for record in records) / TURN
+        notes.append(
+            f"Every record turns on one way, through {turns:.0f} turns at most: what changes over them is a "
+            "function of the time as well, so that no law of the position is looked for but waves that "
+            "repeat with each turn."
         )
     return [*notes, *_notes_of_clipping(records), *_notes_of_inertia(base, records)]
 

@@ -20,6 +20,7 @@ from impactcell.discrepancy.machine.records.motion_scale import (
 )
 from impactcell.discrepancy.machine.records.smoothing import bell, smoothed_speed, test_function, test_slope
 from impactcell.discrepancy.machine.records.step_forces import force_about
+from impactcell.discrepancy.machine.records.travel import periods_of_a_turn
 from impactcell.discrepancy.machine.records.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.terms.base_model import BaseModel, Response, TermChoice
 from impactcell.discrepancy.machine.terms.catalogue import MotionState, Term
@@ -264,8 +265,15 @@ def shape_grid(term: Term, scale: MotionScale) -> tuple[float, ...]:
     """Values of a term's shape that are tried; (0,) where it has none."""
     if term.shape is None:
         return (0.0,)
+    if is_of_turns(term, scale):
+        return periods_of_a_turn(scale.high - scale.low)
     size = scale.speed if term.shape.covariate == "speed" else scale.high - scale.low
     return tuple(share * size for share in term.shape.shares)
+
+
+def is_of_turns(term: Term, scale: MotionScale) -> bool:
+    """Whether a term repeats with each turn or a part of it, and by nothing else."""
+    return term.shape is not None and term.shape.name == "period" and scale.many_turns
 
 
 def finer_grid(grid: Sequence[float], shape: float) -> tuple[float, ...]:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from impactcell.discrepancy.machine.records.travel import goes_one_way
 from impactcell.discrepancy.machine.records.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.regression.block_sums import RIDGE, Blocks, fit_blocks
 from impactcell.discrepancy.machine.regression.nuisance_priors import OFFSET
@@ -18,9 +19,6 @@ from impactcell.physics.effect_names import in_words
 
 MAX_ALIKE = 0.95
 """Squared correlation with a part of the machine from which on a term cannot be told from it [1]."""
-
-ONE_WAY = 0.95
-"""Share of a record's path that lies between its ends where it goes one way [1]."""
 
 
 def machine_parts(base: BaseModel, *, is_driven: bool) -> dict[str, Column]:
@@ -120,11 +118,8 @@ def alike_note(
 
 def one_way_note(records: Sequence[UniformRecord]) -> list[str]:
     """Say that a function of position may be one of time, where every record goes one way."""
-    for record in records:
-        width = max(len(record.position) // 200, 1)  # between quantised positions noise goes to and fro
-        coarse = record.position[::width]
-        if abs(coarse[-1] - coarse[0]) < ONE_WAY * float(np.abs(np.diff(coarse)).sum()):
-            return []
+    if not goes_one_way(records):
+        return []
     note = (
         "Every record goes one way: a function of position is one of the time since its beginning as well, "
         "and these records hardly tell them apart."
