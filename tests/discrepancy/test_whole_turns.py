@@ -9,8 +9,9 @@ import pytest
 
 from impactcell.campaign import Campaign, Coordinate, Excitation
 from impactcell.discrepancy.machine import BaseModel, NumberPrior, investigate_machine
-from impactcell.discrepancy.machine.records.whole_turns import without_wraps
+from impactcell.discrepancy.machine.records.whole_turns import refuse_saw_teeth, without_wraps
 from impactcell.discrepancy.report.german_notes import note as german_note
+from impactcell.errors import CampaignError
 from impactcell.records import Capture, Channel, Samples
 from tests.discrepancy.test_base_model import INERTIA, pendulum, swings
 
@@ -101,3 +102,40 @@ def test_a_gap_in_time_is_no_wrap_but_within_a_record_that_wraps_the_shorter_way
     angle = TURN * 3.0 * time[:400]
     steps = [abs(after - before) for before, after in pairwise(gone_on(angle % TURN, time))]
     assert max(steps) < 0.5 * TURN
+
+
+def held(position: Samples, coordinate: Coordinate) -> Campaign:
+    shot = Capture(1, math.nan, 1.0, None, Channel(TIME[: len(position)], position, None))
+    campaign, _ = without_wraps(Campaign(Excitation.FREE_SLIDE, (shot,), coordinate=coordinate))
+    return campaign
+
+
+@pytest.mark.parametrize(
+    ("coordinate", "after"), [(Coordinate.ROTATION, 4.02), (Coordinate.TRANSLATION, 0.1)]
+)
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_what_begins_anew_after_something_else_than_a_turn_is_refused(
+    coordinate: Coordinate, after: float, direction: float
+) -> None:
+    """It was simulated for minutes, tooth by tooth."""
+    noise = 1e-3 * after * np.random.default_rng(3).standard_normal(TIME.size)
+    position = (direction * after * (0.7 * TIME + 0.05 * TIME**2)) % after + noise
+    with pytest.raises(
+        CampaignError, match=rf"shot 1: \w+ jumps back by {after:.2g} (rad|m) again and again"
+    ):
+        refuse_saw_teeth(held(position, coordinate))
+
+
+@pytest.mark.parametrize(
+    "position",
+    [
+        0.1 * np.sin(9.0 * TIME),
+        0.1 * np.sign(np.sin(9.0 * TIME)),  # from end to end between two samples
+        TURN * 3.0 * TIME % TURN,  # goes on after each turn
+        0.1 * TIME + np.where(np.arange(5000) % 1000 == 7, 1.0, 0.0),  # spikes
+        np.where(TIME < 2.0, 0.0, 0.3),
+    ],
+    ids=["sine", "ends", "turns", "spikes", "once"],
+)
+def test_other_positions_are_no_saw_teeth(position: Samples) -> None:
+    refuse_saw_teeth(held(position, Coordinate.ROTATION))

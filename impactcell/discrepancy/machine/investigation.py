@@ -21,7 +21,7 @@ from impactcell.discrepancy.machine.records.record_notes import notes_of_records
 from impactcell.discrepancy.machine.records.release import from_release
 from impactcell.discrepancy.machine.records.travel import turns_on
 from impactcell.discrepancy.machine.records.uniform_records import UniformRecord, uniform_records
-from impactcell.discrepancy.machine.records.whole_turns import without_wraps
+from impactcell.discrepancy.machine.records.whole_turns import refuse_saw_teeth, without_wraps
 from impactcell.discrepancy.machine.simulation.clear_strengths import with_clear_strengths
 from impactcell.discrepancy.machine.simulation.experiment_design import with_experiments
 from impactcell.discrepancy.machine.simulation.held_out import with_simulations
@@ -86,6 +86,7 @@ def _fits_of(
 ) -> tuple[MachineFits, list[str]]:
     """Prepare the records of a campaign for a base model, and say what is to be said of them."""
     campaign, turned = without_wraps(campaign)
+    refuse_saw_teeth(campaign)
     data_faults = inspect_campaign(campaign)
     if pulls_back(base):  # what swings comes back to where it began, and follows a slow force
         data_faults = tuple(one for one in data_faults if one.fault is not Fault.PRESLIDING_ONLY)
