@@ -86,6 +86,8 @@ class DiscrepancyResult:
         Where something remains, the law that may be missing; None where nothing does, or nothing can be said.
     plant : Plant or None
         Nominal plant that was given.
+    limits : CellLimits
+        Of the cell in which the next experiment would be made.
     """
 
     conclusion: Conclusion
@@ -110,6 +112,7 @@ class DiscrepancyResult:
     law: LawFinding | None
     plant: Plant | None
     seed: int
+    limits: CellLimits = UNLIMITED
 
     @property
     def verdict(self) -> str:
@@ -251,10 +254,13 @@ def investigate(
         validation=outcome.validation,
         simulation=simulate_held_out(held_problem, nominal, final),
         unexplained=describe_gap(problem, selection.nominal) if conclusion.verdict == UNKNOWN else None,
-        experiments=propose_experiments(problem, final, tied, prepared.batches, limits, conclusion.ties),
+        experiments=propose_experiments(
+            problem, final, tied, prepared.batches, limits, conclusion.ties, remains=selection.remains
+        ),
         law=law,
         plant=plant,
         seed=seed,
+        limits=limits,
     )
 
 

@@ -7,7 +7,13 @@ from impactcell.discrepancy.data.campaign_checks import (
 )
 from impactcell.discrepancy.data.cell_limits import CellLimits
 from impactcell.discrepancy.data.coarse_raster import CoarseRaster, beside_rasters, coarse_rasters
-from impactcell.discrepancy.data.excitation import MIN_HELD_OUT, MIN_TRAINING, ExcitationStrategy
+from impactcell.discrepancy.data.excitation import (
+    HELD_OUT_SHARE,
+    MIN_HELD_OUT,
+    MIN_TRAINING,
+    ExcitationStrategy,
+    Setting,
+)
 from impactcell.discrepancy.data.free_slide import FreeSlide
 from impactcell.discrepancy.data.noise_floor import (
     NoiseFloor,
@@ -39,6 +45,7 @@ __all__ = [
     "BETWEEN_SHOTS",
     "CHANNELS",
     "FORCE",
+    "HELD_OUT_SHARE",
     "MIN_HELD_OUT",
     "MIN_TRAINING",
     "PHASES",
@@ -52,6 +59,7 @@ __all__ = [
     "PreparedCampaign",
     "PreparedShot",
     "ReplicateSpread",
+    "Setting",
     "ShotSet",
     "Trajectory",
     "beside_rasters",

@@ -35,6 +35,10 @@ NO_DRIVE = np.empty((2, 0))
 """Drive of a part that is not driven."""
 
 
+Setting = tuple[str, tuple[PreparedShot, ...]]
+"""What a next experiment could take, in words and as shots, of which it takes equally many."""
+
+
 class ExcitationStrategy(ABC):
     """What the workflow has to know of one excitation; the defaults are those of independent shots.
 
@@ -168,8 +172,8 @@ class ExcitationStrategy(ABC):
 
     def settings_within_reach(
         self, shots: Sequence[PreparedShot], masses_kg: Samples, batches: Sequence[str], limits: CellLimits
-    ) -> list[tuple[str, PreparedShot]]:
-        """List settings that a next experiment could take, in words and as a shot; none by default.
+    ) -> list[Setting]:
+        """List settings that a next experiment could take; none by default.
 
         Masses are those of the shots, fitted where they are not stated; batches are named in order.
         """
@@ -177,23 +181,23 @@ class ExcitationStrategy(ABC):
         return []
 
 
-Setting = tuple[float, float]
+_Struck = tuple[float, float]
 """Velocity and direction of a shot: each is held out in its share."""
 
 
-def _setting(shot: PreparedShot) -> Setting:
+def _setting(shot: PreparedShot) -> _Struck:
     velocity = shot.velocity_m_s if math.isfinite(shot.velocity_m_s) else 0.0
     return (velocity, float(shot.direction))
 
 
-def _draw_held_out(settings: Sequence[Setting], rng: np.random.Generator) -> IndexArray:
+def _draw_held_out(settings: Sequence[_Struck], rng: np.random.Generator) -> IndexArray:
     """Draw held-out shots, a quarter of each setting."""
     n = len(settings)
     order = rng.permutation(n)
     # Round after round one shot of every setting, at evenly spread shares of it: the quarter with the
     # smallest shares is a quarter of each.
     rank = np.empty(n, dtype=np.int64)
-    drawn: Counter[Setting] = Counter()
+    drawn: Counter[_Struck] = Counter()
     for index in order.tolist():
         rank[index] = drawn[settings[index]]
         drawn[settings[index]] += 1
@@ -202,7 +206,7 @@ def _draw_held_out(settings: Sequence[Setting], rng: np.random.Generator) -> Ind
     return np.sort(np.lexsort((order, share))[:wanted])
 
 
-def _features(shots: Sequence[PreparedShot], settings: Sequence[Setting]) -> Samples:
+def _features(shots: Sequence[PreparedShot], settings: Sequence[_Struck]) -> Samples:
     """List how shots differ from those of their setting, of variance 1, shape (n, features).
 
     Places in the order of each covariate and of the energy of a tap, and whether that is of the largest
@@ -214,7 +218,7 @@ def _features(shots: Sequence[PreparedShot], settings: Sequence[Setting]) -> Sam
     columns = [rankdata(np.nan_to_num(column)) for column in columns]
     columns.append((columns[-1] > (1.0 - HELD_OUT_SHARE) * len(shots)).astype(np.float64))
     deviation = np.array(columns).T
-    places = defaultdict[Setting | None, list[int]](list)
+    places = defaultdict[_Struck | None, list[int]](list)
     for place, setting in enumerate(settings):
         places[setting if settings.count(setting) > 1 else None].append(place)
     for alike in places.values():

@@ -8,7 +8,7 @@ import numpy as np
 
 from impactcell.campaign import Excitation
 from impactcell.discrepancy.data.cell_limits import CellLimits
-from impactcell.discrepancy.data.excitation import ExcitationStrategy
+from impactcell.discrepancy.data.excitation import ExcitationStrategy, Setting
 from impactcell.discrepancy.data.phases import FREE_SLIDE, LOADING, PRELOAD, STOP, UNLOADING, Trajectory
 from impactcell.discrepancy.data.plant_guesses import contact_by_regression, friction_of_slides
 from impactcell.discrepancy.data.prepared_shots import (
@@ -169,36 +169,65 @@ class Tap(ExcitationStrategy):
 
     def settings_within_reach(
         self, shots: Sequence[PreparedShot], masses_kg: Samples, batches: Sequence[str], limits: CellLimits
-    ) -> list[tuple[str, PreparedShot]]:
-        """Velocities, masses, directions, dwells and batches: what was done, and one step beyond it."""
+    ) -> list[Setting]:
+        """Velocities, masses, directions, dwells and batches: what was done, and one step beyond it.
+
+        All of them come after the shots that there are. Where the part can be struck from either end, each
+        velocity and mass may also be taken half in one direction and half in the other.
+        """
+        latest = max(shots, key=lambda shot: shot.record)
         typical = sorted(shots, key=lambda shot: (shot.velocity_m_s, shot.record))[len(shots) // 2]
+        after = replace(typical, batch=latest.batch, record=latest.records, group=-1)
         velocities = sorted({shot.velocity_m_s for shot in shots})
-        directions = {shot.direction for shot in shots} | ({1, -1} if limits.both_ends else set())
-        settings = []
-        for wanted in (velocities[0] * SLOWER, velocities[0], velocities[-1], velocities[-1] * FASTER):
-            velocity = min(wanted, limits.max_velocity_m_s)
-            for mass in _masses(shots, masses_kg, limits):
-                for direction in sorted(directions, reverse=True):
-                    words = f"{velocity / MM_PER_MIN:.0f} mm/min, {mass:.3g} kg, direction {direction:+d}"
-                    shot = replace(
-                        typical, velocity_m_s=velocity, mass_kg=mass, direction=direction, group=-1
-                    )
-                    settings.append((words, shot))
-                    if math.isfinite(typical.dwell_s):
-                        settings += [
-                            (f"{words}, after {dwell:g} s at rest", replace(shot, dwell_s=dwell))
-                            for dwell in DWELLS_S
-                        ]
+        directions = sorted({shot.direction for shot in shots} | ({1, -1} if limits.both_ends else set()))
+        wanted = (velocities[0] * SLOWER, velocities[0], velocities[-1], velocities[-1] * FASTER)
+        settings: list[Setting] = []
+        for velocity in dict.fromkeys(min(one, limits.max_velocity_m_s) for one in wanted):
+            for mass in dict.fromkeys(_masses(shots, masses_kg, limits)):
+                at = replace(after, velocity_m_s=velocity, mass_kg=mass)
+                each = tuple(replace(at, direction=direction) for direction in reversed(directions))
+                words = f"{velocity / MM_PER_MIN:.0f} mm/min, {mass:.3g} kg"
+                ways: list[Setting] = [(f"{words}, direction {one.direction:+d}", (one,)) for one in each]
+                if len(each) > 1:
+                    ways.append((f"{words}, half of them in each direction", each))
+                settings += _with_dwells(ways, typical)
         last = max(shot.batch for shot in shots)
         if last:
             settings += [
                 (
                     f"batch {batches[batch] or 'without a name'} again, after the others",
-                    replace(typical, batch=batch, record=typical.records),
+                    (replace(after, batch=batch),),
                 )
                 for batch in range(last + 1)
             ]
-        return settings
+        return [(words, tuple(_in_group(one, shots) for one in made)) for words, made in settings]
+
+
+def _with_dwells(ways: Sequence[Setting], typical: PreparedShot) -> list[Setting]:
+    """Add to each way of striking those with a certain rest before, where the shots tell theirs."""
+    settings: list[Setting] = []
+    for words, made in ways:
+        settings.append((words, made))
+        if math.isfinite(typical.dwell_s):
+            settings += [
+                (f"{words}, after {dwell:g} s at rest", tuple(replace(one, dwell_s=dwell) for one in made))
+                for dwell in DWELLS_S
+            ]
+    return settings
+
+
+def _in_group(shot: PreparedShot, shots: Sequence[PreparedShot]) -> PreparedShot:
+    """Put a shot into the replicate group that has its settings, or into one that no other shot is in."""
+    alike = (
+        one.group
+        for one in shots
+        if math.isclose(one.velocity_m_s, shot.velocity_m_s)
+        and (math.isclose(one.mass_kg, shot.mass_kg) or not math.isfinite(one.mass_kg))
+        and one.direction == shot.direction
+    )
+    return replace(
+        shot, group=next(alike, max(one.group for one in shots) + (2 if shot.direction > 0 else 1))
+    )
 
 
 def _masses(shots: Sequence[PreparedShot], masses_kg: Samples, limits: CellLimits) -> tuple[float, ...]:

@@ -37,7 +37,8 @@ from impactcell.discrepancy.model.phase_of_samples import phase_positions, sampl
 from impactcell.discrepancy.model.problem import FitState, Problem, remove_jumps
 from impactcell.discrepancy.model.profile import join_intervals, profile_parameters
 from impactcell.discrepancy.model.setting_dependence import dependence_notes
-from impactcell.discrepancy.model.shot_fits import normal_equations
+from impactcell.discrepancy.model.shot_fits import gram_of_shots, normal_equations
+from impactcell.discrepancy.model.shot_parameters import ShotParameters, known_std
 from impactcell.discrepancy.model.split_fits import SplitFits, fit_split
 from impactcell.discrepancy.model.told_settings import (
     SETTINGS,
@@ -63,6 +64,7 @@ __all__ = [
     "Roughness",
     "Scores",
     "SharedError",
+    "ShotParameters",
     "SplitFits",
     "Support",
     "concatenate_products",
@@ -77,8 +79,10 @@ __all__ = [
     "fit_from",
     "fit_nominal",
     "fit_split",
+    "gram_of_shots",
     "implausible_notes",
     "join_intervals",
+    "known_std",
     "linearise",
     "normal_equations",
     "parameter_name",

@@ -2,6 +2,7 @@
 
 import math
 import re
+from collections.abc import Sequence
 from typing import Any, Final
 
 from impactcell.discrepancy.data import CHANNELS
@@ -12,10 +13,11 @@ from impactcell.discrepancy.report.german_reasons import reason
 from impactcell.discrepancy.report.german_references import REFERENCES
 from impactcell.discrepancy.report.german_words import phrase
 from impactcell.discrepancy.report.next_step import Step, plan_next_step
+from impactcell.discrepancy.report.planned_experiments import by_effect
 from impactcell.discrepancy.report.result import result_document
 from impactcell.discrepancy.workflow import DiscrepancyResult
+from impactcell.german.findings import enumerated, german_headline, with_decimal_commas
 from impactcell.german.findings import german_equation as equation
-from impactcell.german.findings import german_headline, with_decimal_commas
 from impactcell.physics.effect import German
 from impactcell.physics.effects import find_effect
 from impactcell.physics.free_column_forms import printed
@@ -23,7 +25,7 @@ from impactcell.physics.free_column_forms import printed
 __all__ = [
     "advice", "equation", "headline", "in_german", "label", "law_sentences", "next_step",
     "noise_floor_sentence", "note", "phrase", "reason", "reference", "setting", "shape", "split_sentence",
-    "written",
+    "told_apart", "written",
 ]  # fmt: skip
 _LABELS: Final = {
     "all shots": "alle Stöße",
@@ -71,6 +73,7 @@ _SETTINGS: Final = (
     (r"^no setting within reach .*",
      "keine erreichbare Einstellung unterscheidet sie: eines von beiden für sich messen"),
     (r"\bdirection ([+-]\d)", r"Richtung \1"),
+    (r"\bhalf of them in each direction\b", "je die Hälfte in jeder Richtung"),
     (r"\bafter ([\d.]+) s at rest$", r"nach \1 s Ruhe"),
 )  # fmt: skip
 _SHAPES: Final = (
@@ -92,6 +95,16 @@ _SHAPES: Final = (
 def label(english: str) -> str:
     """Say a label of a figure; KeyError where it has not been put into German."""
     return _LABELS[english]
+
+
+def told_apart(pairs: Sequence[tuple[str, str]]) -> str:
+    """Say which effects an experiment tells from which.
+
+    >>> told_apart([("surface_tilt", "batch_shift"), ("surface_tilt", "friction_drift")])
+    '„Neigung des Tisches“ von „Chargenunterschied“ und von „Reibungsdrift“'
+    """
+    said = [(phrase(name), [f"von „{phrase(one)}“" for one in rivals]) for name, rivals in by_effect(pairs)]
+    return ", und ".join(f"„{name}“ {enumerated(rivals, 'und')}" for name, rivals in said)
 
 
 def setting(english: str) -> str:

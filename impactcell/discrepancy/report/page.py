@@ -9,6 +9,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, select_autoescape
 
 from impactcell.discrepancy.report import figures, german_sentences, law_figures, sentences
+from impactcell.discrepancy.report.planned_experiments import lacks_limits, planned_experiments
 from impactcell.discrepancy.report.result import locate_effect
 from impactcell.discrepancy.search import ALPHA, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
@@ -202,7 +203,8 @@ def page_context(result: DiscrepancyResult, source: str, language: str = "en") -
         "replicates": result.replicates,
         "own": result.held_problem.shot_parameter_names,
         "spread": result.final.spread,
-        "proposals": result.experiments,
+        "proposals": planned_experiments(result, said.told_apart),
+        "lacks_limits": lacks_limits(result),
         "alpha": ALPHA,
         "seed": result.seed,
         "guide": EFFECT_GUIDE,

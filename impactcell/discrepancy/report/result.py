@@ -139,7 +139,7 @@ def _simulation(simulation: Simulation) -> dict[str, Any]:
 
 
 def experiments(proposals: Sequence[Proposal]) -> list[dict[str, Any]]:
-    """Write down what would tell tied effects apart."""
+    """Write down what would tell tied effects apart; of a measurement that is no shot no power is known."""
     return [
         {
             "separates": list(proposal.effects),

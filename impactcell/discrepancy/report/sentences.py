@@ -1,10 +1,12 @@
 """The outcome in two sentences: what is established, and what remains."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from impactcell.discrepancy.data import CHANNELS
 from impactcell.discrepancy.report.next_step import Step, lacks_replicates, plan_next_step
+from impactcell.discrepancy.report.planned_experiments import by_effect
 from impactcell.discrepancy.search import NO_GAP, UNTESTED, Remaining, Validation
 from impactcell.discrepancy.workflow import DiscrepancyResult
 from impactcell.german.findings import enumerated
@@ -161,6 +163,16 @@ def split_sentence(result: DiscrepancyResult) -> str:
 def label(english: str) -> str:
     """Say a label of a figure or a table."""
     return english
+
+
+def told_apart(pairs: Sequence[tuple[str, str]]) -> str:
+    """Say which effects an experiment tells from which.
+
+    >>> told_apart([("surface_tilt", "batch_shift"), ("surface_tilt", "friction_drift")])
+    'surface tilt from batch shift and from friction drift'
+    """
+    said = [(phrase(name), [f"from {phrase(one)}" for one in rivals]) for name, rivals in by_effect(pairs)]
+    return ", and ".join(f"{name} {enumerated(rivals, 'and')}" for name, rivals in said)
 
 
 def setting(english: str) -> str:

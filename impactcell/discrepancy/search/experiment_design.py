@@ -1,38 +1,43 @@
-"""Which shots would tell tied effects apart, how many of them, and with what power.
+"""Which shots, added to those there are, would tell tied effects apart, how many of them, and how surely.
 
-A setting is looked for by the distance of two models' predictions; what it promises is then simulated: shots
-of one model with its noise and scatter, judged by both.
+Settings are looked for by the distance that is left when the rival is fitted to old and new shots together
+(`separation.py`). What the nearest of them promise is the share of redraws in which the rule that ties the
+two effects no longer does (`tie_redraws.py`), whichever of them is true; of the setting that is proposed it
+is that about where the models come when they are fitted to simulated shots (`simulated_shots.py`).
 """
 
+import heapq
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from scipy.stats import norm
 
-from impactcell.discrepancy.data import CellLimits, PreparedShot, ShotSet, concatenate_shots
-from impactcell.discrepancy.model import Fit, Problem, refit_shot_parameters
+from impactcell.discrepancy.data import HELD_OUT_SHARE, CellLimits, Setting
+from impactcell.discrepancy.model import Fit, Problem
+from impactcell.discrepancy.search.further_shots import FurtherShots, NewShots, answers_of
+from impactcell.discrepancy.search.indistinguishability import MAX_DEVIATION, NEGLIGIBLE_DIFFERENCE
+from impactcell.discrepancy.search.separation import Pair, refitted_separation, weights_of
+from impactcell.discrepancy.search.tie_redraws import is_told, share_told
 from impactcell.errors import PhysicsError
 from impactcell.physics import Kind
 from impactcell.physics.effect_names import COLUMN_PREFIX
 from impactcell.physics.effects import LIBRARY, find_effect
 from impactcell.physics.free_column_forms import printed
-from impactcell.records import Samples
 
 POWER = 0.9
-"""Probability with which the shots proposed tell two effects apart."""
-SIGNIFICANCE = 0.025
-"""One-sided error of the test that they are proposed for."""
-MAX_SHOTS = 400
-"""More shots than that are no proposal."""
-SIMULATED_SHOTS = 40
-"""Shots of a setting that are simulated: their scatter is known to a ninth."""
-FEW_SHOTS = 20
-"""A setting that takes no more than that when it is simulated is proposed, whatever others take."""
-MAX_SIMULATED_SETTINGS = 3
-"""Settings, the cheapest first, that are simulated until one keeps what it promises."""
+"""Share of redraws in which the shots proposed tell two effects apart."""
+POWER_DEVIATIONS = 1.28
+"""Standard deviations beyond which a tenth of a normal distribution lies."""
+COUNTS = (2, 3, 4, 6, 8, 10, 12, 15, 20, 25, 30, 40, 60, 80, 120, 200)
+"""Shots of each kind that may be proposed; more than the last are no proposal. Own choice."""
+FEW_DRAWS, DRAWS = 60, 300
+"""Redraws of a first look, and those by which a share is told: it is known to 2 %."""
+MAX_LOOKS = 40
+"""Settings and numbers of shots, the fewest first, of which shots are drawn."""
+MAX_REFITS = 4
+"""Proposals that are held against shots simulated and fitted to, until one keeps its promise."""
 SIMULATION = 9
 """Stream of random numbers of these shots, apart from those of other draws."""
 LATE_CHANNELS = frozenset({"force_sensor_lag", "channel_skew", "position_sensor_lag"})
@@ -43,7 +48,7 @@ UNLIMITED = CellLimits()
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """A setting and how many shots of it tell two effects apart.
+    """A setting and how many shots of it, added to those there are, tell two effects apart.
 
     Attributes
     ----------
@@ -54,6 +59,7 @@ class Proposal:
     shots : int
         0 where it is not a matter of shots but of a measurement of its own.
     power : float
+        Share of redraws that told them apart; nan where it is no matter of shots.
     """
 
     effects: tuple[str, str]
@@ -69,6 +75,8 @@ def propose_experiments(
     batches: Sequence[str],
     limits: CellLimits = UNLIMITED,
     ties: Mapping[str, Sequence[str]] = MappingProxyType({}),
+    *,
+    remains: bool = False,
 ) -> tuple[Proposal, ...]:
     """For each tie the cheapest setting that breaks it.
 
@@ -83,14 +91,171 @@ def propose_experiments(
         Of the cell in which the shots would be made.
     ties : mapping
         Of each effect all that is tied with it, columns of `shots.csv` among them.
+    remains : bool
+        Something remains beside the best model: then effects between shots are held against each other by
+        the friction factors alone.
     """
     settings = problem.shots.excitation.settings_within_reach(
         problem.shots.items, best.shot_parameters.mass_kg, batches, limits
     )
-    experiments = [
-        _cheapest_experiment(problem, best, fit, settings, (effect, rival)) for effect, rival, fit in rivals
-    ]
+    found = []
+    for name, rival, fit in rivals:
+        by_factors = remains and LIBRARY[name].kind is Kind.BETWEEN_SHOTS
+        tie = _Tie(Pair.of(problem, best, fit, by_factors=by_factors), settings, (name, rival))
+        found.append((tie, _cheapest_experiment(tie)))
+    experiments = _merged(found)
     return (*experiments, *_other_orders(ties))
+
+
+class _Tie:
+    """Two tied models, either of which may be the true one, and what further shots there could be.
+
+    Parameters
+    ----------
+    pair : Pair
+        The best one and its rival.
+    settings : sequence of (str, tuple of PreparedShot)
+    effects : tuple of str
+        In which they differ.
+    """
+
+    def __init__(self, pair: Pair, settings: Sequence[Setting], effects: tuple[str, str]) -> None:
+        self.effects = effects
+        self.pairs = (pair, pair.swapped())
+        self.settings = settings
+
+    def screened(self) -> list[tuple[int, int]]:
+        """Shots in all that may do, and the place of their setting, the fewest first."""
+        places = self._distinct()
+        items = [shot for place in places for shot in self.settings[place][1]]
+        if not items:
+            return []
+        every = [FurtherShots(pair, items).about_now() for pair in self.pairs]
+        found, begin = [], 0
+        for place in places:
+            kinds = np.arange(begin, begin + len(self.settings[place][1]))
+            begin += len(kinds)
+            if not all(new.is_known[kinds].all() for new in every):
+                continue
+            left = [_left(pair, new.select(kinds)) for pair, new in zip(self.pairs, every, strict=True)]
+            count = max(map(_screened_count, left))
+            if count <= COUNTS[-1]:
+                found.append((count * len(kinds), place))
+        return sorted(found)
+
+    def _distinct(self) -> list[int]:
+        """List places of settings with an answer of their own: a rest with which nothing goes has none."""
+        items = [shot for _, made in self.settings for shot in made]
+        try:
+            answers = list(answers_of(self.pairs[0], items)) if items else []
+        except (PhysicsError, ValueError):
+            return []
+        found: dict[bytes, int] = {}
+        begin = 0
+        for place, (_, made) in enumerate(self.settings):
+            found.setdefault(b"".join(answers[begin : begin + len(made)]), place)
+            begin += len(made)
+        return [*found.values()]
+
+    def power(self, place: int, count: int) -> float:
+        """Share of redraws that tell the models apart by so many shots of each kind, the lesser of both.
+
+        0 where the plant has no answer.
+        """
+        made = self.settings[place][1]
+        trained = _trained(count)
+        kind = np.repeat(np.arange(len(made)), trained)
+        groups = np.repeat([shot.group for shot in made], trained)
+        least = 1.0
+        for pair in self.pairs:
+            try:
+                new = FurtherShots(pair, made).about_refit(trained)
+            except (PhysicsError, ValueError):
+                return 0.0
+            if not new.is_known.all():
+                return 0.0
+            for draws in (FEW_DRAWS, DRAWS):
+                told = share_told(pair, new, kind, groups, draws, np.random.default_rng(SIMULATION))
+                if told < POWER:
+                    return told
+            least = min(least, told)
+        return least
+
+    def is_told(self, place: int, count: int) -> bool:
+        """Whether it is so with shots of either model that are simulated, and fitted to with all others."""
+        made = self.settings[place][1] * _trained(count)
+        return all(is_told(pair, made, np.random.default_rng(SIMULATION)) for pair in self.pairs)
+
+    def proposal(self, place: int, count: int, power: float) -> Proposal:
+        """Propose so many shots of each kind of a setting."""
+        words, made = self.settings[place]
+        return Proposal(self.effects, words, count * len(made), power)
+
+
+def _trained(count: int) -> int:
+    """How many of so many shots the models are fitted to: the others are held out."""
+    return max(math.floor((1.0 - HELD_OUT_SHARE) * count), 1)
+
+
+def _left(pair: Pair, new: NewShots) -> list[float]:
+    """Log-likelihood that is left between the models of a pair by each of `COUNTS`, to first order."""
+    weights = weights_of(pair.own, pair.models[1].spread)
+    old, seen = pair.old[1].eliminate(weights), new.without_noise(*pair.columns).eliminate(weights)
+    counts = [[_trained(count)] * len(new.gram) for count in COUNTS]
+    return [0.5 * refitted_separation(old, seen, each) for each in counts]
+
+
+def _screened_count(left: Sequence[float]) -> int:
+    """Shots of each kind that may break the rule that ties; more than the last of `COUNTS` where none do.
+
+    The scatter of a log-likelihood D over draws has a variance of about 2 D.
+    """
+    for count, D in zip(COUNTS, left, strict=True):
+        if max((MAX_DEVIATION + POWER_DEVIATIONS) * math.sqrt(2.0 * D), NEGLIGIBLE_DIFFERENCE) <= D:
+            return count
+    return COUNTS[-1] + 1
+
+
+def _cheapest_experiment(tie: _Tie) -> tuple[int, int, float] | None:
+    """Find the setting that takes the fewest shots: the next cheapest is looked at until one does.
+
+    Returns
+    -------
+    place, count, power : int, int, float
+        Of the setting, shots of each kind, and what they reach; None where no setting does.
+    """
+    waiting, refits = tie.screened(), 0
+    for _ in range(MAX_LOOKS):
+        if not waiting or refits == MAX_REFITS:
+            break
+        shots, place = heapq.heappop(waiting)
+        kinds = len(tie.settings[place][1])
+        count = shots // kinds
+        power = tie.power(place, count)
+        if power >= POWER:
+            refits += 1
+            if tie.is_told(place, count):
+                return place, count, power
+        more = next((one for one in COUNTS if one > count), 0)
+        if more:
+            heapq.heappush(waiting, (more * kinds, place))
+    return None
+
+
+def _merged(found: Sequence[tuple[_Tie, tuple[int, int, float] | None]]) -> Iterator[Proposal]:
+    """Propose for each tie what a larger experiment for another one tells as well, else its own."""
+    settled = [(tie, cheapest) for tie, cheapest in found if cheapest is not None]
+    settled.sort(key=lambda one: -one[0].proposal(*one[1]).shots)
+    chosen: dict[tuple[int, int], None] = {}
+    of_tie: dict[tuple[str, str], Proposal] = {}
+    for tie, cheapest in settled:
+        told = ((*one, tie.power(*one)) for one in chosen if one != cheapest[:2])
+        place, count, power = next((one for one in told if one[2] >= POWER), cheapest)
+        chosen[place, count] = None
+        of_tie[tie.effects] = tie.proposal(place, count, power)
+    for tie, _ in found:
+        nothing = Proposal(tie.effects, _separate_measurement(*tie.effects), 0, math.nan)
+        yield of_tie.get(tie.effects, nothing)
 
 
 def _other_orders(ties: Mapping[str, Sequence[str]]) -> Iterator[Proposal]:
@@ -99,83 +264,7 @@ def _other_orders(ties: Mapping[str, Sequence[str]]) -> Iterator[Proposal]:
         for rival in (name for name in tied if name.startswith(COLUMN_PREFIX)):
             (column,) = find_effect(rival).columns
             setting = f"the same settings again, column {printed(column)} in another order"
-            yield Proposal((effect, rival), setting, 0, 1.0)
-
-
-def _cheapest_experiment(
-    problem: Problem,
-    best: Fit,
-    rival_fit: Fit,
-    settings: Sequence[tuple[str, PreparedShot]],
-    effects: tuple[str, str],
-) -> Proposal:
-    feasible: dict[float, tuple[int, str, PreparedShot]] = {}
-    for setting, shot in settings:
-        separation = _separation(problem, best, rival_fit, shot)
-        count = _shots_needed(math.sqrt(max(separation, 0.0)))
-        if count <= MAX_SHOTS:  # a dwell that no effect goes with changes nothing
-            feasible.setdefault(separation, (count, setting, shot))
-    proposals = []
-    for _, setting, shot in sorted(feasible.values(), key=lambda one: one[0])[:MAX_SIMULATED_SETTINGS]:
-        per_shot = simulated_separation(problem, best, rival_fit, shot)
-        count = _shots_needed(per_shot)
-        if count <= MAX_SHOTS:
-            power = float(norm.cdf(math.sqrt(count) * per_shot - norm.ppf(1.0 - SIGNIFICANCE)))
-            proposals.append(Proposal(effects, setting, count, power))
-        if count <= FEW_SHOTS:
-            break
-    nothing = Proposal(effects, _separate_measurement(*effects), 0, 1.0)
-    return min(proposals, key=lambda proposal: proposal.shots, default=nothing)
-
-
-def _shots_needed(per_shot: float) -> int:
-    """Shots that reach the power, from the mean difference of a shot over its standard deviation."""
-    if per_shot <= 0.0:
-        return MAX_SHOTS + 1
-    needed = ((norm.ppf(1.0 - SIGNIFICANCE) + norm.ppf(POWER)) / per_shot) ** 2
-    return max(math.ceil(min(needed, MAX_SHOTS + 1.0)), 2)
-
-
-def simulated_separation(problem: Problem, best: Fit, rival_fit: Fit, shot: PreparedShot) -> float:
-    """Log-likelihood by which simulated shots prefer the model that made them: mean over standard deviation.
-
-    Each shot has noise and a friction factor of its own, which both models fit to it. 0 where the plant has
-    no answer.
-    """
-    shots = concatenate_shots(
-        problem.shots.excitation,
-        problem.shots.gravity_m_s2,
-        problem.shots.stroke_m,
-        (shot,) * SIMULATED_SHOTS,
-        problem.shots.noise_std,
-    )
-    rng = np.random.default_rng(SIMULATION)
-    try:
-        model = Problem(shots, problem.batches, best.effects)
-        guess = model.initial_guess()
-        scatter = best.spread * rng.standard_normal(SIMULATED_SHOTS)
-        residual = model.residual(best.theta, replace(guess, log_factor=scatter))
-        made = shots.values + shots.unwhiten(rng.standard_normal(residual.size) - residual)
-        simulated = Problem(_with_values(shots, made), problem.batches, best.effects)
-        preferred, other = (refit_shot_parameters(simulated, fit) for fit in (best, rival_fit))
-    except (PhysicsError, ValueError):
-        return 0.0
-    difference = preferred.log_likelihood(simulated.shots) - other.log_likelihood(simulated.shots)
-    if not np.isfinite(difference).all():
-        return 0.0
-    return float(difference.mean()) / max(float(difference.std(ddof=1)), 1e-12)
-
-
-def _with_values(shots: ShotSet, values: Samples) -> ShotSet:
-    """Put other samples into the same shots."""
-    items = []
-    for place, shot in enumerate(shots.items):
-        ends = np.cumsum([len(channel) for channel in shot.values])[:-1]
-        force, position, actuator = np.split(values[shots.samples_of(place)], ends)
-        items.append(replace(shot, values=(force, position, actuator)))
-    return concatenate_shots(
-        shots.excitation, shots.gravity_m_s2, shots.stroke_m, tuple(items), shots.noise_std
-    )
+            yield Proposal((effect, rival), setting, 0, math.nan)
 
 
 def _separate_measurement(effect: str, rival: str) -> str:
@@ -201,28 +290,3 @@ def _separate_measurement(effect: str, rival: str) -> str:
     if Kind.ACTUATOR in kinds:
         return "record the actuator's position"
     return "no setting within reach tells them apart: measure one of them by itself"
-
-
-def _separation(problem: Problem, best: Fit, rival_fit: Fit, shot: PreparedShot) -> float:
-    """Squared distance of the two models' predictions for one shot, its own factor free, in noise units.
-
-    Friction factors that differ between the models count by their spread from shot to shot.
-    """
-    noise = problem.shots.noise_std
-    shot_set = concatenate_shots(
-        problem.shots.excitation, problem.shots.gravity_m_s2, problem.shots.stroke_m, (shot,), noise
-    )
-    single = Problem(shot_set, problem.batches, best.effects)
-    try:
-        state = single.evaluate(best.theta, single.initial_guess(), best.spread)
-        rival = single.with_effects(rival_fit.effects)
-        difference = state.residual - rival.residual(rival_fit.theta, state.shot_parameters)
-        slope = single.shot_jacobian(state)[0]
-    except (PhysicsError, ValueError):
-        return 0.0
-    if not (np.isfinite(difference).all() and np.isfinite(slope).all()):
-        return 0.0
-    along = float(slope @ slope)
-    shift = float(difference @ slope) / along if along > 0.0 else 0.0
-    remainder = difference - shift * slope
-    return float(remainder @ remainder) / 4.0 + (shift / max(best.spread, 1e-6)) ** 2

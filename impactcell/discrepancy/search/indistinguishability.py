@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
 from impactcell.discrepancy.data import IndexArray
@@ -57,35 +58,62 @@ class Alternative:
 
 def folds(problem: Problem) -> IndexArray:
     """Fold of every shot: its replicate group, or itself where a group holds many of the shots."""
-    group = np.array([shot.group for shot in problem.shots.items])
+    return folds_of_groups(np.array([shot.group for shot in problem.shots.items]))
+
+
+def folds_of_groups(group: IndexArray) -> IndexArray:
+    """Fold of every shot, shape (n,), by the replicate groups; one that holds many of the shots is none."""
+    count = len(group)
     _, member, size = np.unique(group, return_inverse=True, return_counts=True)
-    large = size[member] > MAX_FOLD_SHARE * problem.count
-    return np.where(large, problem.count + np.arange(problem.count), member)
+    large = size[member] > MAX_FOLD_SHARE * count
+    return np.where(large, count + np.arange(count), member)
 
 
 def evaluate_out_of_shot(problem: Problem, model: Fit) -> CandidateFit:
-    """Log-likelihood of every shot under parameters fitted without its fold.
+    """Log-likelihood of every shot under parameters fitted without its fold."""
+    linearisation = linearise(problem, model)
+    unmet = unmet_gradient(problem, model, linearisation)
+    loss = out_of_shot_loss(
+        linearisation.shot_information, linearisation.shot_gradient, folds(problem), unmet
+    )
+    return CandidateFit(model, model.log_likelihood(problem.shots) - loss)
+
+
+def out_of_shot_loss(H: Samples, u: Samples, fold: IndexArray, unmet: Samples) -> Samples:
+    """Log-likelihood that every shot loses by parameters fitted without its fold, shape (..., n).
 
     With u and H the gradient and information of a fold, and u_0 and H_0 those of all shots, the parameters
     without it lie at -s = (H_0 - H)^-1 (u_0 - u), where the fold's misfit is larger by 2 u's + s'H s. At an
     optimum u_0 is zero; short of it, where one fold tells nearly all of a direction, u_0 must not be taken
     for what the others say. What only one fold tells has no such parameters: its leverage is held below one.
+
+    Parameters
+    ----------
+    H, u : ndarray, shapes (n, p, p) and (..., n, p)
+        Information and gradient of every shot; gradients may be those of several draws of the same shots.
+    fold : ndarray, shape (n,)
+    unmet : ndarray, shape (p,)
+        u_0, where a fit has come to rest short of its optimum.
     """
-    linearisation = linearise(problem, model)
-    scale = np.sqrt(np.maximum(np.diag(linearisation.information), 1e-300))
-    H = linearisation.shot_information / np.outer(scale, scale)
-    u = linearisation.shot_gradient / scale
-    unmet = unmet_gradient(problem, model, linearisation) / scale
-    log_likelihood = model.log_likelihood(problem.shots)
-    fold = folds(problem)
-    whitener = _whitener(H.sum(0))
-    for number in np.unique(fold):
-        in_fold = fold == number
-        leverage, axes = np.linalg.eigh(whitener.T @ H[in_fold].sum(0) @ whitener)
-        axes = whitener @ axes
-        step = axes @ ((axes.T @ (u[in_fold].sum(0) - unmet)) / (1.0 - np.minimum(leverage, MAX_LEVERAGE)))
-        log_likelihood[in_fold] -= u[in_fold] @ step + 0.5 * np.einsum("a,iab,b->i", step, H[in_fold], step)
-    return CandidateFit(model, log_likelihood)
+    scale = np.sqrt(np.maximum(np.diag(H.sum(0)), 1e-300))
+    whitener = _whitener(H.sum(0) / np.outer(scale, scale)) / scale[:, None]
+    H, u = whitener.T @ H @ whitener, u @ whitener
+    numbers, member = np.unique(fold, return_inverse=True)
+    of_fold = np.zeros((len(numbers), len(fold)))
+    of_fold[member, np.arange(len(fold))] = 1.0
+    leverage, axes = np.linalg.eigh(np.tensordot(of_fold, H, 1))
+    along = each_times(of_fold @ u - unmet @ whitener, axes)
+    along = along / (1.0 - np.minimum(leverage, MAX_LEVERAGE))
+    step = each_times(along, np.swapaxes(axes, 1, 2))[..., member, :]
+    loss: Samples = ((u + 0.5 * each_times(step, H)) * step).sum(-1)
+    return loss
+
+
+def each_times(rows: Samples, matrices: Samples) -> Samples:
+    """Rows, shape (..., n, p), each times its matrix, shape (n, p, r)."""
+    first = np.moveaxis(rows, -2, 0)
+    product = first.reshape(len(matrices), -1, rows.shape[-1]) @ matrices
+    return np.moveaxis(product.reshape(*first.shape[:-1], matrices.shape[-1]), 0, -2)
 
 
 def _whitener(information: Samples) -> Samples:
@@ -104,12 +132,24 @@ def rank_out_of_shot(problem: Problem, fits: Iterable[Fit]) -> list[CandidateFit
 
 def are_indistinguishable(problem: Problem, best: CandidateFit, other: CandidateFit) -> bool:
     """Whether the shots do not tell two models apart."""
-    difference = best.each - other.each
-    gap, std = float(difference.sum()), float(difference.std() * np.sqrt(len(difference)))
     dispersion = max(float(best.fit.misfit(problem.shots).mean() / problem.sizes.mean()), 1.0)
-    return gap < NEGLIGIBLE_DIFFERENCE or (
-        gap <= MAX_DEVIATION * std and gap < DECISIVE_DIFFERENCE * dispersion
-    )
+    return not bool(are_apart(best.each - other.each, dispersion))
+
+
+def are_apart(difference: Samples, dispersion: float) -> NDArray[np.bool_]:
+    """Whether models are told apart by what shots say of them, shape (...,) of differences (..., n).
+
+    Parameters
+    ----------
+    difference : ndarray, shape (..., n)
+        Log-likelihood of every shot out of shot under the likelier model less that under the other one.
+    dispersion : float
+        Mean squared residual of the likelier one, at least 1.
+    """
+    gap, std = difference.sum(-1), difference.std(-1) * np.sqrt(difference.shape[-1])
+    is_sure = (gap > MAX_DEVIATION * std) | (gap >= DECISIVE_DIFFERENCE * dispersion)
+    apart: NDArray[np.bool_] = (gap >= NEGLIGIBLE_DIFFERENCE) & is_sure
+    return apart
 
 
 def widest_rival(spread: float, shots: int) -> float:

@@ -200,7 +200,7 @@ def _proposal(
             if power >= POWER:
                 return Proposal(tie, change.words, count * len(change.records), power)
     nothing = "nothing from a fifth to twice of what was done tells them apart: measure one of them by itself"
-    return Proposal(tie, nothing, 0, 1.0)
+    return Proposal(tie, nothing, 0, math.nan)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
