@@ -56,6 +56,7 @@ from impactcell.discrepancy.search import (
     select_model,
     shared_error,
     simulate_held_out,
+    tied_models,
 )
 from impactcell.physics import Kind, Plant
 from impactcell.physics.effects import LIBRARY
@@ -232,7 +233,7 @@ def investigate(
         *(one for one in parameters if not one.effect),
         *estimate_effects(context, evidence, parameters, selection.nominal),
     )
-    tied = _tied_models(selection, conclusion.established)
+    tied = tied_models(selection, conclusion.established)
     for _effect, _rival, model in tied:
         stated = join_intervals(stated, estimate_beside_error(problem, model, prepared))
     return DiscrepancyResult(
@@ -293,14 +294,3 @@ def _nameable(prepared: PreparedCampaign, library: Sequence[str] | None) -> tupl
     if prepared.excitation.tests_between_shots:
         return names
     return tuple(name for name in names if LIBRARY[name].kind is not Kind.BETWEEN_SHOTS)
-
-
-def _tied_models(selection: SelectionResult, established: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
-    """List each established effect with a rival that is tied with it, and the model that has the rival."""
-    models = []
-    for variant in exchanged(selection):
-        (effect,) = set(selection.added) - set(variant.added)
-        (rival,) = set(variant.added) - set(selection.added)
-        if effect in established and variant.accepted is not None:
-            models.append((effect, rival, variant.accepted))
-    return models

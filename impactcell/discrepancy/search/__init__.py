@@ -1,6 +1,13 @@
 """Where a fitted model fails and which effect mends it: tests, candidates, selection, proof."""
 
-from impactcell.discrepancy.search.acceptance import Outdone, SelectionResult, exchanged, fitted_with, reject
+from impactcell.discrepancy.search.acceptance import (
+    Outdone,
+    SelectionResult,
+    exchanged,
+    fitted_with,
+    reject,
+    tied_models,
+)
 from impactcell.discrepancy.search.between_shots import (
     chance_by_exchange,
     chance_of_narrowing,
@@ -120,6 +127,7 @@ __all__ = [
     "select_model",
     "shared_error",
     "simulate_held_out",
+    "tied_models",
     "trace_rivals",
     "widest_rival",
     "without_each_effect",

@@ -104,6 +104,17 @@ def exchanged(selection: SelectionResult) -> list[SelectionResult]:
     return variants
 
 
+def tied_models(selection: SelectionResult, established: tuple[str, ...]) -> list[tuple[str, str, Fit]]:
+    """List each established effect with a rival that is tied with it, and the model that has the rival."""
+    models = []
+    for variant in exchanged(selection):
+        (effect,) = set(selection.added) - set(variant.added)
+        (rival,) = set(variant.added) - set(selection.added)
+        if effect in established and variant.accepted is not None:
+            models.append((effect, rival, variant.accepted))
+    return models
+
+
 def fitted_with(selection: SelectionResult, added: Iterable[str]) -> Fit | None:
     """Fit that the search made of the nominal model with some effects; None where it made none."""
     wanted = {*selection.nominal.fit.effects, *added}

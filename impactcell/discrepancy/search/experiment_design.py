@@ -103,8 +103,7 @@ def propose_experiments(
         by_factors = remains and LIBRARY[name].kind is Kind.BETWEEN_SHOTS
         tie = _Tie(Pair.of(problem, best, fit, by_factors=by_factors), settings, (name, rival))
         found.append((tie, _cheapest_experiment(tie)))
-    experiments = _merged(found)
-    return (*experiments, *_other_orders(ties))
+    return (*_merged(found), *_other_orders(ties))
 
 
 class _Tie:
@@ -131,7 +130,8 @@ class _Tie:
         if not items:
             return []
         every = [FurtherShots(pair, items).about_now() for pair in self.pairs]
-        found, begin = [], 0
+        found: dict[tuple[object, ...], tuple[int, int]] = {}
+        begin = 0
         for place in places:
             kinds = np.arange(begin, begin + len(self.settings[place][1]))
             begin += len(kinds)
@@ -140,8 +140,10 @@ class _Tie:
             left = [_left(pair, new.select(kinds)) for pair, new in zip(self.pairs, every, strict=True)]
             count = max(map(_screened_count, left))
             if count <= COUNTS[-1]:
-                found.append((count * len(kinds), place))
-        return sorted(found)
+                # What differs by less than a hundredth needs as many shots: the first stands for all.
+                alike = tuple(f"{D:.2g}" for one in left for D in one)
+                found.setdefault((len(kinds), alike), (count * len(kinds), place))
+        return sorted(found.values())
 
     def _distinct(self) -> list[int]:
         """List places of settings with an answer of their own: a rest with which nothing goes has none."""
@@ -219,19 +221,26 @@ def _screened_count(left: Sequence[float]) -> int:
 def _cheapest_experiment(tie: _Tie) -> tuple[int, int, float] | None:
     """Find the setting that takes the fewest shots: the next cheapest is looked at until one does.
 
+    Where as many shots of another setting were as sure, more of this one are not looked at.
+
     Returns
     -------
     place, count, power : int, int, float
         Of the setting, shots of each kind, and what they reach; None where no setting does.
     """
     waiting, refits = tie.screened(), 0
+    seen = set[tuple[int, float]]()
     for _ in range(MAX_LOOKS):
         if not waiting or refits == MAX_REFITS:
-            break
+            return None
         shots, place = heapq.heappop(waiting)
         kinds = len(tie.settings[place][1])
         count = shots // kinds
         power = tie.power(place, count)
+        as_sure = (shots, round(power, 2))
+        if 0.0 < power < POWER and as_sure in seen:
+            continue
+        seen.add(as_sure)
         if power >= POWER:
             refits += 1
             if tie.is_told(place, count):
@@ -244,7 +253,7 @@ def _cheapest_experiment(tie: _Tie) -> tuple[int, int, float] | None:
 
 def _merged(found: Sequence[tuple[_Tie, tuple[int, int, float] | None]]) -> Iterator[Proposal]:
     """Propose for each tie what a larger experiment for another one tells as well, else its own."""
-    settled = [(tie, cheapest) for tie, cheapest in found if cheapest is not None]
+    settled = [(tie, one) for tie, one in found if one is not None]
     settled.sort(key=lambda one: -one[0].proposal(*one[1]).shots)
     chosen: dict[tuple[int, int], None] = {}
     of_tie: dict[tuple[str, str], Proposal] = {}
@@ -253,9 +262,8 @@ def _merged(found: Sequence[tuple[_Tie, tuple[int, int, float] | None]]) -> Iter
         place, count, power = next((one for one in told if one[2] >= POWER), cheapest)
         chosen[place, count] = None
         of_tie[tie.effects] = tie.proposal(place, count, power)
-    for tie, _ in found:
-        nothing = Proposal(tie.effects, _separate_measurement(*tie.effects), 0, math.nan)
-        yield of_tie.get(tie.effects, nothing)
+    for effects in (tie.effects for tie, _ in found):
+        yield of_tie.get(effects, Proposal(effects, _separate_measurement(*effects), 0, math.nan))
 
 
 def _other_orders(ties: Mapping[str, Sequence[str]]) -> Iterator[Proposal]:
