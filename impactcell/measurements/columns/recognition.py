@@ -133,7 +133,7 @@ COMMAND_WORDS = frozenset(
 MEASURED_WORDS = frozenset((
     "meas", "measured", "act", "actual", "ist", "m", "mes", "msr", "joint", "j", "motor", "link",
 ))  # fmt: skip
-"""Words beside a sign of a formula that leave it what it is, as in `q_meas`, `tau_m` or `joint_1_q`."""
+"""Words beside a sign of a formula that leave it what it is: q that was measured, or of a motor or joint."""
 SPEED_NAMES = frozenset((
     "omega", "w", "rpm", "drehzahl", "winkelgeschwindigkeit", "dq", "qd", "qdot", "dtheta", "thetad",
     "thetadot", "dphi", "phidot", "dalpha", "alphadot", "xdot", "ydot", "vx", "vy", "vz", "dot",
@@ -144,7 +144,7 @@ ACCELERATION_NAMES = frozenset((
 ))  # fmt: skip
 """Signs of an acceleration."""
 JOINT_SIGNS = frozenset(("q", "theta", "phi", "alpha", "tau"))
-"""Signs that are numbered by joints, as in `q7` or `theta2`."""
+"""Signs that are numbered by joints, as of the seventh q."""
 RATE_WORDS = "sample_rate sampling_rate rate_hz abtastrate samplerate fs sampling_frequency abtastfrequenz"
 """Names under which a file says how often it was sampled."""
 STEP_WORDS = (

@@ -130,12 +130,12 @@ _SPEED_SUFFIXES = (("m", "s"), ("mm", "s"), ("m", "min"), ("mm", "min"), ("rad",
 """Ends of a name that are a speed and no time, as in velocity_mm_min."""
 
 _TORQUES = ("torque", "moment", "tau", "trq")
-"""Names of what is in N m where `nm` stands behind them, for no torque is in nanometres."""
+"""Names of what is in N m where "nm" stands behind them, for no torque is in nanometres."""
 _NO_LENGTHS = frozenset((
     "tau", "torque", "trq", "force", "effort", "dq", "qd", "ddq", "qdd", "omega", "vel", "velocity",
     "speed", "dtheta", "u", "i", "current", "voltage",
 ))  # fmt: skip
-"""Names of what is in no metres: there `_m` says that it was measured, or of the motor."""
+"""Names of what is in no metres: there "_m" says that it was measured, or of the motor."""
 _SEPARATORS = (" ?/ ?", " in ", ", ", " ", "_")
 """What stands between a name and its unit, in the order in which they are believed."""
 _ONE_WORD = re.compile("(?!1 ?/ ?s|1 / )[^ /]+(?: ?/ ?[^ /]+)?")
@@ -231,7 +231,7 @@ def split_unit(header: str) -> tuple[str, str | None]:
 
 
 def split_units(headers: Sequence[str]) -> list[tuple[str, str | None]]:
-    """Take the units off the names of a table: where `_m` is none behind one name, it is none behind others.
+    """Take the units off the names of a table: where "_m" is none behind one name, it is none behind others.
 
     Examples
     --------
