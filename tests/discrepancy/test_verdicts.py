@@ -122,6 +122,23 @@ def test_a_gap_that_rises_or_hardly_falls_confirms_nothing(viscous: DiscrepancyR
     assert not trifle.is_real()
 
 
+def test_the_fall_of_a_gap_that_is_in_the_factors_is_as_sure_as_theirs(viscous: DiscrepancyResult) -> None:
+    """Its interval went from 68.2 to 68.2 %: that of the traces, of which one shot changes."""
+    after = viscous.held_final
+    factors = after.shot_parameters
+    spread = float(np.std(factors.log_factor))
+    measure = replace(measure_of(viscous), replicates=ReplicateSpread(spread, 12))
+    scatter = 4.0 * spread * np.random.default_rng(5).standard_normal(len(factors.log_factor))
+    residual = after.residual.copy()
+    residual[viscous.held_problem.shots.samples_of(0)] *= 1.001
+    wide = replace(factors, log_factor=factors.log_factor + scatter)
+    before = replace(after, residual=residual, shot_parameters=wide)
+    whole, alone = measure.change(before, after, tuple(Part)), measure.change(before, after, (Part.FACTORS,))
+    assert measure.gap(before).factor > 2.0 * measure.gap(before).trace
+    assert whole.low < whole.closed - 0.01 < whole.closed + 0.01 < whole.high
+    assert whole.p_value == alone.p_value
+
+
 def test_traces_that_gain_what_the_friction_factors_lose_confirm_nothing(viscous: DiscrepancyResult) -> None:
     spread = float(np.std(viscous.held_nominal.shot_parameters.log_factor))
     measure = replace(measure_of(viscous), replicates=ReplicateSpread(spread, 12))

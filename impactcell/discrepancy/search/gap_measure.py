@@ -111,10 +111,12 @@ class GapMeasure:
             falls = {part: gaps[0].of([part]) - gaps[1].of([part]) for part in Part}
             parts = [max(Part, key=lambda part: -math.inf if math.isnan(falls[part]) else falls[part])]
         closed = low = high = math.nan
-        slope = self._slope(before, after, parts)
+        by_factors = Part.FACTORS in parts and gaps[0].factor > gaps[0].trace
+        by_traces = Part.TRACES in parts and not by_factors
+        slope = self._slope(before, after, by_traces=by_traces)
         if gaps[0].of(parts) > MIN_OPEN_GAP:
             closed = _closed_share(gaps[0].of(parts), gaps[1].of(parts))
-            if slope is not None and Part.TRACES in parts:
+            if slope is not None and by_traces:
                 low, high = self._ends_by_slope(before, gaps, parts, slope)
             else:
                 low, high = self._resampled_ends(before, after, parts)
@@ -185,9 +187,9 @@ class GapMeasure:
         factor = math.sqrt(float(np.mean(log_factor**2))) / spread if spread > 0.0 else math.nan
         return Gap(trace, factor)
 
-    def _slope(self, before: Fit, after: Fit, parts: Sequence[Part]) -> Slope | None:
+    def _slope(self, before: Fit, after: Fit, *, by_traces: bool) -> Slope | None:
         """Slope of what is left on its change, in the factors, or where few shots show it; None elsewhere."""
-        if Part.TRACES not in parts:
+        if not by_traces:
             return slope_of_factors(before.shot_parameters.log_factor, after.shot_parameters.log_factor)
         shots = self.problem.shots
         counted = self._counts(shots.channel)
