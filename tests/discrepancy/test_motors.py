@@ -20,6 +20,7 @@ from impactcell.discrepancy.machine import (
     NumberPrior,
     OpenLoopError,
     TermChoice,
+    establishing,
     investigate_machine,
 )
 from impactcell.discrepancy.machine.better_simulated import best_simulated
@@ -28,7 +29,9 @@ from impactcell.discrepancy.machine.investigation import hold_what_cannot_be_see
 from impactcell.discrepancy.machine.records.uniform_records import uniform_records
 from impactcell.discrepancy.machine.search.look_alikes import machine_parts, parts_that_may_be_off
 from impactcell.records import Capture, Channel
+from tests.discrepancy.machine_study import establish_in
 from tests.discrepancy.test_closing_notes import filmed
+from tests.discrepancy.test_column_slips import joint
 
 INERTIA, VISCOUS, COULOMB = 1e-4, 2e-3, 5e-3
 MOTOR = BaseModel(coordinate=Coordinate.ROTATION, inertia=NumberPrior(INERTIA))
@@ -84,6 +87,25 @@ def test_of_a_motor_without_any_friction_both_are_named() -> None:
     for name, value in (("viscous_friction", VISCOUS), ("coulomb_friction", COULOMB)):
         low, high = strength(finding, name)
         assert low <= value <= high, name
+
+
+@pytest.mark.slow
+def test_a_pair_that_leaves_something_by_its_own_weights_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is found then is what is found where no pair is looked for."""
+    base = BaseModel(
+        coordinate=Coordinate.ROTATION, inertia=NumberPrior(0.05), gravity_torque=NumberPrior(0.8), terms=()
+    )
+    records = joint()
+    assert set(establish_in(records, base).established) == {"viscous_friction", "coulomb_friction"}
+    with monkeypatch.context() as patch:
+        patch.setattr(establishing, "MAX_EXPECTED_GAP", 0.0)
+        refused = establish_in(records, base)
+    monkeypatch.setattr(establishing, "select_pair", lambda *_: None)
+    plain = establish_in(records, base)
+    assert len(refused.established) < 2
+    assert (refused.verdict, refused.established) == (plain.verdict, plain.established)
+    assert refused.steps[0].reason == plain.steps[0].reason != ""
+    assert refused.fall.after == pytest.approx(plain.fall.after, rel=1e-9)
 
 
 @pytest.mark.slow
