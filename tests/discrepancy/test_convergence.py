@@ -169,7 +169,11 @@ def test_a_shot_that_alone_tells_a_parameter_makes_no_difference_without_end(
     seen = replace(
         exact, shot_information=information, information=information.sum(0), shot_gradient=gradient
     )
-    monkeypatch.setattr(indistinguishability, "unmet_gradient", lambda *_: 0.0)
+    monkeypatch.setattr(
+        indistinguishability,
+        "unmet_gradient",
+        lambda _, __, linearised: np.zeros(linearised.shot_gradient.shape[1]),
+    )
     without = evaluate_out_of_shot(problem, nominal).each
     monkeypatch.setattr(indistinguishability, "linearise", lambda problem, model: seen)
     lost = without - evaluate_out_of_shot(problem, nominal).each
