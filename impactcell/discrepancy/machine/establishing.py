@@ -92,7 +92,7 @@ def establish(
     training, held_out = fits.blocks()
     steps: list[SelectionStep] = []
     candidates: list[TermChoice] = []
-    before_notes, pair = notes, None
+    told_before, pair = notes, None
     enough = MachineFinding.enough(training, held_out)
     numbers = numbers_held(fits.base, fits.records, fits.scale)
     if enough:
@@ -131,7 +131,7 @@ def establish(
     models, falls = proof.models, proof.falls
     training, held_out = fits.blocks()
     if pair is not None and (len(falls) < len(pair) or gap(training, models[-1]) > MAX_EXPECTED_GAP):
-        return establish(fits, before_notes, seed, contradicted, with_pairs=False)
+        return establish(fits, told_before, seed, contradicted, with_pairs=False)
     if falls:
         now = replace(_search(fits, training, candidates), smooth_force=fits.smooth_force(candidates))
         steps = _with_ties_of_now(now, fits.columns(base_terms), steps)
