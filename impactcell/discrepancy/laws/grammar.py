@@ -180,6 +180,16 @@ class Shaped:
         """How many numbers the term has beside its amplitude."""
         return sum(map(len, self.shapes))
 
+    @property
+    def periods(self) -> list[float]:
+        """Periods of its waves."""
+        return [
+            value
+            for atom, values in zip(self.term, self.shapes, strict=True)
+            for shape, value in zip(atom.shapes, values, strict=True)
+            if shape.name == "period"
+        ]
+
 
 def name(form: Form) -> str:
     """Name of a functional form: its terms in a fixed order."""

@@ -11,7 +11,7 @@ from impactcell.discrepancy.machine.better_simulated import errors_with_terms
 from impactcell.discrepancy.machine.establishing import establish
 from impactcell.discrepancy.machine.finding import MachineFinding
 from impactcell.discrepancy.machine.fits.machine_fits import MachineFits
-from impactcell.discrepancy.machine.records.travel import ABOUT_A_TURN, TURN_IN_DEGREES
+from impactcell.discrepancy.machine.records.travel import is_turn_in_degrees
 from impactcell.discrepancy.machine.records.uniform_records import UniformRecord
 from impactcell.discrepancy.machine.regression.block_plan import BlockPlan
 from impactcell.discrepancy.machine.regression.block_sums import blocks_of, fit_blocks
@@ -128,7 +128,7 @@ def _least_error_as_it_is(fits: MachineFits, finding: MachineFinding, slip: Colu
     """
     now = finding.simulated[-1]
     least = min(1.0, (100.0 - _fit_percent(fits, UNDRIVEN, finding.seed)) / (100.0 - now.fit_percent))
-    if slip == replace(DEGREES, error=slip.error):
+    if slip.words == DEGREES.words:
         return least
     return min([least, *(rmse / now.rmse for rmse in errors_with_terms(fits, finding).values())])
 
@@ -146,7 +146,7 @@ def with_degrees_asked_for(finding: MachineFinding) -> MachineFinding:
     """Ask whether angles are in degrees where a wave of them repeats after about 360."""
     if finding.base.coordinate is not Coordinate.ROTATION:
         return finding
-    turns = [period for period in _periods(finding) if abs(period / TURN_IN_DEGREES - 1.0) <= ABOUT_A_TURN]
+    turns = [period for period in _periods(finding) if is_turn_in_degrees(period)]
     if not turns:
         return finding
     asked = f"A period of {turns[0]:.0f} rad is a turn in degrees: see whether angle_rad is in degrees."
@@ -158,13 +158,7 @@ def _periods(finding: MachineFinding) -> list[float]:
     periods = [term.shape for term in finding.final.terms if term.choice.identifier.startswith("periodic_")]
     law = finding.law
     if law is not None and law.choice is not None and law.choice.law is not None:
-        periods += [
-            value
-            for item in law.choice.law.terms
-            for atom, values in zip(item.term, item.shapes, strict=True)
-            for shape, value in zip(atom.shapes, values, strict=True)
-            if shape.name == "period"
-        ]
+        periods += [period for item in law.choice.law.terms for period in item.periods]
     return periods
 
 

@@ -187,6 +187,7 @@ def _candidates(base: BaseModel, records: Sequence[UniformRecord]) -> tuple[Term
         name for name, values in columns.items() if len(values) == len(records) and len(set(values)) > 1
     ]
     own = {choice.name for choice in base.terms}
+    goes_on = turns_on(records, base.coordinate)
     choices = []
     for identifier, term in CATALOGUE.items():
         if term.needs_covariate:
@@ -195,7 +196,7 @@ def _candidates(base: BaseModel, records: Sequence[UniformRecord]) -> tuple[Term
             continue
         elif term.has_memory and base.response is Response.POSITION:
             continue  # the path is what is predicted
-        elif identifier in OF_THE_PLACE and turns_on(records, base.coordinate):
+        elif identifier in OF_THE_PLACE and goes_on:
             continue  # what turns on is at no place again
         else:
             choices.append(TermChoice(identifier))

@@ -44,13 +44,7 @@ def _is_resolved(form: RankedForm, tested: tuple[float, float]) -> bool:
 
 
 def _periods(form: RankedForm) -> list[float]:
-    return [
-        value
-        for item in form.terms
-        for atom, values in zip(item.term, item.shapes, strict=True)
-        for shape, value in zip(atom.shapes, values, strict=True)
-        if shape.name == "period"
-    ]
+    return [period for item in form.terms for period in item.periods]
 
 
 def _choices(form: str, ranked: Sequence[RankedForm], reference: float) -> tuple[TermChoice, ...]:

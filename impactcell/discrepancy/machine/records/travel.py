@@ -60,6 +60,11 @@ def periods_of_a_turn(travel: float) -> tuple[float, ...]:
     return (*parts, 1.5 * TURN, *degrees)
 
 
+def is_turn_in_degrees(period: float) -> bool:
+    """Whether a period is about that of a turn of an angle in degrees."""
+    return abs(period / TURN_IN_DEGREES - 1.0) <= ABOUT_A_TURN
+
+
 def may_repeat(period: float, coordinate: Coordinate, low: float, high: float) -> bool:
     """Whether a law of position over a range may repeat after a period.
 
@@ -76,7 +81,7 @@ def may_repeat(period: float, coordinate: Coordinate, low: float, high: float) -
     travel = high - low
     if coordinate is not Coordinate.ROTATION:
         return period <= travel
-    if abs(period / TURN_IN_DEGREES - 1.0) <= ABOUT_A_TURN and period <= travel:
+    if is_turn_in_degrees(period) and period <= travel:
         return True  # which is asked about
     if not goes_through_many_turns(coordinate, low, high):
         return period <= max(travel, (1.0 + ABOUT_A_TURN) * TURN)
